@@ -48,12 +48,14 @@ class Equations:
         """Return the weight of every row, shape (..., row, time), from weights of the joints, shape (..., joint, time).
 
         A row that takes a torque as it is has the weight of its joint, since friction jumps where the joint reverses. A row
-        that multiplies it by the velocity has weight 1: the product is continuous there.
+        that multiplies it by the velocity has weight 1, the product is continuous there, or 0 if the torque was not logged.
         """
         weight = np.ones((*joints.shape[:-2], self.kinds, joints.shape[-1]))
         for (row, joint), B in self.B.items():
             if isinstance(B, float):
                 weight[..., row, :] *= joints[..., joint, :]
+            elif joint in self.signals.log.missing:
+                weight[..., row, :] = 0.0
         return weight
 
     @cached_property

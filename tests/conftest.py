@@ -10,8 +10,17 @@ import sys
 import sysconfig
 from pathlib import Path
 
-NEEDED = ("pinocchio", "covertable", "distributed", "dask_jobqueue", "rosbags")
-"""Modules of the dependency group `test`, which `uv run idbench` does not install: 200 MB, robots of other people above all."""
+NEEDED = (
+    "pinocchio",
+    "covertable",
+    "distributed",
+    "dask_jobqueue",
+    "rosbags",
+    "sympy",
+    "yaml",
+    *(("pydrake",) if sys.platform == "linux" else ()),
+)
+"""Modules of the dependency group `test`, which `uv run idbench` does not install: Drake and robots of others, 400 MB."""
 
 if any(importlib.util.find_spec(name) is None for name in NEEDED):
     if not (uv := os.environ.get("UV") or shutil.which("uv")):

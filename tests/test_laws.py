@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import idbench
-from idbench.identify import BLOCKS, AbstractFriction, NoMask, SettingError, ShapedFriction, idbench_chain
+from idbench.identify import BLOCKS, AbstractFriction, NoMask, ShapedFriction, idbench_chain
 from idbench.sim.errors import ScenarioError
 from idbench.sim.frictions import Law
 from idbench.sim.trajectories import RandomMoves
@@ -29,37 +29,11 @@ class Square(AbstractFriction):
         return np.abs(qd) ** self.power * np.sign(qd)
 
 
-@dataclass(frozen=True)
-class Winding(AbstractFriction):
-    """A force of two steps, which no function that is written can have."""
-
-    symbol: ClassVar[str] = "Fw"
-    unit: ClassVar[str] = "N m"
-
-    def force(self, q, qd):
-        speed = np.abs(qd)
-        return speed * np.sign(q)
-
-
 def laws():
     """Return the laws of the table with one parameter a joint, but for those that every robot has, by name."""
     made = {name: BLOCKS.create(name) for name in BLOCKS.builtin}
     found = {name: block.law if isinstance(block, ShapedFriction) else block for name, block in made.items()}
     return {name: law for name, law in found.items() if isinstance(law, AbstractFriction) and law.symbol not in ("Fv", "Fs")}
-
-
-@pytest.mark.parametrize("law", [*laws().values(), Square()], ids=lambda law: type(law).__name__)
-def test_what_is_written_is_the_force(law, rng):
-    """The expression of a written function gives the numbers of the law, to the last bit."""
-    q, qd = rng.normal(size=(2, 3, 50))
-    settings = {name: f"({getattr(law, name)!r})" for name in getattr(law, "__dataclass_fields__", {})}
-    written = eval(law.source().format(**settings), {"np": np, "q": q, "qd": qd})
-    np.testing.assert_array_equal(np.broadcast_to(written, qd.shape), law.force(q, qd))
-
-
-def test_a_force_that_is_no_expression_is_refused():
-    with pytest.raises(SettingError, match="one expression"):
-        Winding().source()
 
 
 @pytest.mark.parametrize("name", [*laws(), Square()], ids=str)

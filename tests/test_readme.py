@@ -22,6 +22,7 @@ def block(readme, heading, language):
     return re.search(rf"```{language}\n(.*?)```", section, re.DOTALL)[1]
 
 
+@pytest.mark.thorough
 def test_the_excerpt_is_what_table1_prints_and_the_example_prints_its_answer(readme, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert main(["table1"]) == 0

@@ -22,7 +22,7 @@ from idbench.experiments.judgement.judgement import Judgement, judge
 from idbench.experiments.judgement.remedies import checks
 from idbench.experiments.reports.estimates import conclusion
 from idbench.experiments.results.attempts import Attempts
-from idbench.experiments.results.writing import require_free, write_text
+from idbench.experiments.results.writing import folder_for, write_text
 from idbench.identify import Array, MotionLog, Problem, State, Validation, validate
 from idbench.identify.arrays import combined
 from idbench.identify.judge.torque_interval import torque_interval
@@ -194,8 +194,11 @@ class Identification:
         units = tuple(robot.units(j)[0] for j in range(self.fit.basis.n))
         return Score(robot.robot.joints, units, found, Verdict.of(self.fit, found, self.fit.diagnosis or ()))
 
-    def write(self, *paths: str | Path, force: bool = False) -> None:
-        """Write files for other software: .urdf or .xml, the identified robot; .json, parameters; .py, a function.
+    def write(self, *paths: str | Path, force: bool = False) -> list[str]:
+        """Write files for other software, and return what is to be said of them.
+
+        .xml, .urdf, .sdf: the identified robot; .yaml, its actuators; .json, base parameters; .py, .c, functions for a
+        controller; .toml, ranges for training; .ensemble, a folder of robots.
 
         Raises
         ------
@@ -212,13 +215,19 @@ class Identification:
         for path in map(Path, paths):
             if path.suffix not in EXPORTS:
                 raise ExperimentError(f"{path}: its name must end with {', '.join(EXPORTS)}")
-            require_free(path, "write", force=force, read=read)
-            EXPORTS[path.suffix][2](self.robot, path)
+            EXPORTS[path.suffix].require_free(path, "write", force=force, read=read)
+            EXPORTS[path.suffix].require(self.robot, path)
+        notes = list[str]()
         for path in map(Path, paths):
-            text, doubts = EXPORTS[path.suffix][1](self.fit, self.model, path)
-            write_text(path, text, "write", force=force, read=read)
-            for doubt in doubts:
+            made = EXPORTS[path.suffix].render(self.fit, self.model, path)
+            if path not in made.texts:  # a folder of files
+                folder_for(path, "write")
+            for target, text in made.texts.items():
+                write_text(target, text, "write", force=force, read=read)
+            for doubt in made.warnings:
                 warnings.warn(f"{path}: {doubt}", stacklevel=2)
+            notes += [note for note in made.notes if note not in notes]
+        return notes
 
     def report(self, path: str | Path, force: bool = False) -> None:
         """Write the report: one HTML file with verdict, parameters, torques, residuals.

@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from importlib.metadata import version
 from itertools import combinations
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -13,7 +14,9 @@ from idbench.experiments.benchmark.definition import Definition
 from idbench.experiments.benchmark.set_fit import SetFit
 from idbench.experiments.benchmark.tools import judged, predictions, what_tools_read, write_for_tools
 from idbench.experiments.errors import is_told, reason
-from idbench.experiments.identification.fit import Fit, fit
+from idbench.experiments.exports.exports import EXPORTS
+from idbench.experiments.identification.fit import Fit
+from idbench.experiments.identification.fitting import fit
 from idbench.experiments.identification.logs import Logs
 from idbench.experiments.identification.request import Request
 from idbench.experiments.judgement.held_out import WORDS, HeldOut
@@ -24,6 +27,7 @@ from idbench.experiments.text import SIGMAS
 from idbench.identify import Estimate, IdentificationError, MotionLog
 from idbench.identify.judge.excitation import seen
 from idbench.sim.engine.driven import free_run
+from idbench.sim.errors import BenchError
 
 
 class Repeats(NamedTuple):
@@ -78,6 +82,9 @@ def free_runs(held_out: HeldOut, model: str, length: float) -> dict[str, Any]:
     return {"length": length, "stretches": len(kept), "diverged": int((~kept).sum()), "nrmse": [finite(x) for x in nrmse]}
 
 
+UNSHARED = ("", "none stated")
+"""Licences under which results are not handed on."""
+
 Made = tuple[dict[str, Any], Callable[[Path], None]]
 """The row of a set, and what writes the files that other tools read into a folder."""
 
@@ -88,7 +95,27 @@ def identified_row(folder: Path, definition: Definition, out: Path) -> Made:
     assert isinstance(asked, IdentifyRequest)
     made = SetFit.of(folder, definition, asked)
     row = row_of(made, predictions(out))
-    return {**row, "tools_read": what_tools_read(made)}, partial(write_for_tools, made)
+    return {**row, "tools_read": what_tools_read(made)}, partial(_write, made)
+
+
+def _write(made: SetFit, folder: Path) -> None:
+    """Write what other tools read, and the robot that was identified where the data's licence lets others have it."""
+    write_for_tools(made, folder)
+    definition, fit = made.definition, made.fit
+    if definition.license in UNSHARED:
+        return
+    said = list[str]()
+    for name in ("identified.xml", "identified.json"):
+        try:
+            exported = EXPORTS[Path(name).suffix].render(fit, fit.leading, folder / name)
+        except (BenchError, IdentificationError) as error:  # the row is worth having all the same
+            said.append(f"no {name}: {error}")
+        else:
+            (folder / name).write_text(exported.texts[folder / name], encoding="utf-8")
+            said += exported.warnings
+    how = f"Identified by {fit.request.estimator} of the {fit.leading} model, idbench {version('idbench')}."
+    source = f"Data: {definition.source}; licence: {definition.license}."
+    (folder / "SOURCE.md").write_text(f"# {definition.title}\n\n{how}\n\n{chr(10).join([source, *said])}\n", encoding="utf-8")
 
 
 def row_of(made: SetFit, predicted: Mapping[str, Path]) -> dict[str, Any]:

@@ -9,7 +9,8 @@ from matplotlib.figure import Figure
 from rich.console import Console
 from rich.text import Text
 
-from idbench.experiments.reports.figures import rendered, svg
+from idbench.experiments.reports.drawn import svg
+from idbench.experiments.reports.figures import rendered
 from idbench.experiments.text import JOINTS, new_table, percentage, print_table
 from idbench.identify import Array
 

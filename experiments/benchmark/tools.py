@@ -18,6 +18,7 @@ from idbench.identify import Array, MotionLog, Problem, TorqueChannel, validate
 from idbench.identify.arrays import combined
 from idbench.identify.rows.rows import manageable
 from idbench.sim.robot.tree import standard_parameters
+from idbench.sim.robot.urdf import parsed
 from idbench.sim.robot.write_urdf import urdf_text
 
 
@@ -64,7 +65,7 @@ def _undelayed(log: MotionLog) -> MotionLog:
 
 def _without_shapes(urdf: str) -> str:
     """Return a URDF without meshes: they are elsewhere, and some tools refuse a robot whose meshes are missing."""
-    root = ElementTree.fromstring(urdf)
+    root, _ = parsed(urdf)
     for link in root.iter("link"):
         for shape in [*link.findall("visual"), *link.findall("collision")]:
             link.remove(shape)

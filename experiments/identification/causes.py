@@ -27,57 +27,66 @@ class Wording(NamedTuple):
 
 
 WORDINGS: Mapping[tuple[str, str], Wording] = {
-    ("gain", "torque"): Wording("torque constant {size} too {large}", "--gain {gains} (times gains that were given)"),
-    ("sign", "torque"): Wording("the torque has the other sign", "--gain {gains} (times gains that were given)"),
+    ("gain", "torque"): Wording("torque constant {size} too {large}", "--gain {gains}"),
+    ("sign", "torque"): Wording("the torque has the other sign", "--gain {gains}"),
     ("sign", "position"): Wording(
         "the position has the other sign", by="turn the axis in the robot's file, or the sign in the log"
     ),
     ("offset", "torque"): Wording("torque offset of {size}", "--add offset"),
-    ("drift", "torque"): Wording("the torque drifts by {size}", by="a warm sensor, or a shorter log"),
+    ("drift", "torque"): Wording("the torque drifts by {size}", by="warm the sensor up, or take a shorter log"),
     ("saturation", "torque"): Wording(
-        "torque constant that falls with the torque, or a limit", by="slower motion, or lighter loads"
+        "torque constant that falls with the torque, or a limit", by="move more slowly, or with lighter loads"
     ),
-    ("dead_band", "torque"): Wording("dead band of the torque, {size}", by="its calibration"),
+    ("dead_band", "torque"): Wording("dead band of the torque, {size}", by="calibrate it"),
     ("delay", "torque"): Wording("torque {late} by {size}, or lagging", "--torque-delay {delay}"),
-    ("delay", "position"): Wording("position {late} by {size}, or lagging", by="the delay of its position"),
+    ("delay", "position"): Wording("position {late} by {size}, or lagging", by="correct the delay of its position"),
     ("zero", "position"): Wording(
         "zero of the position off by {size}", by="subtract it from the joint's positions, or turn the link's frame in the file"
     ),
-    ("scale", "position"): Wording("positions {size} too {large}", by="the scale of the encoder, or its unit"),
-    ("slip", "position"): Wording("position slips by {size} at {instant}", by="the log up to there, or the encoder"),
-    ("eccentric", "position"): Wording("eccentric encoder, {size}", by="the encoder's mounting, or a table of its errors"),
+    ("scale", "position"): Wording("positions {size} too {large}", by="correct the scale of the encoder, or its unit"),
+    ("slip", "position"): Wording("position slips by {size} at {instant}", by="take the log up to there, or mend the encoder"),
+    ("eccentric", "position"): Wording(
+        "eccentric encoder, {size}", by="mount the encoder anew, or correct its errors by a table"
+    ),
     ("rotor", "drive"): Wording("rotor inertia of {size} is missing", "--armature all"),
     ("coupled_rotor", "drive"): Wording("its rotor also turns with the next joint, {size}", "--coupling {coupling}"),
     ("spring", "drive"): Wording(
-        "a spring of {size}", by="stiffness and springref of the joint in the robot's file, or --balancer"
+        "a spring of {size}", by="state stiffness and springref of the joint in the robot's file, or --balancer"
     ),
     ("load", "friction"): Wording("friction grows with the load, by {size}", "--friction {laws}", law="load"),
     ("velocity", "friction"): Wording("friction is nonlinear in velocity", "--friction {laws}", law="stribeck"),
     ("asymmetry", "friction"): Wording("friction differs by direction", "--friction {laws}", law="asymmetric-viscous"),
     ("warming", "friction"): Wording(
-        "friction changes with time, as of a robot that warms up", by="a log of a warm robot, or its temperature"
+        "friction changes with time, as of a robot that warms up", by="log a warm robot, or its temperature"
     ),
     ("hysteresis", "friction"): Wording(
-        "friction with hysteresis after reversals (pre-sliding)", by="a larger --mask-speed, or longer strokes"
+        "friction with hysteresis after reversals (pre-sliding)", by="take a larger --mask-speed, or longer strokes"
     ),
     ("cogging", "drive"): Wording(
         "cogging of {setting:g} waves a turn, {size}", "--friction {laws}", law="cogging:{setting:g}"
     ),
-    ("backlash", "drive"): Wording("play of {size}", by="positions measured at the link"),
-    ("elasticity", "drive"): Wording("compliance of {size}", by="positions measured at the link, or slower motion"),
-    ("length", "link"): Wording("origin of the joint off by {size} along {axis}", by="its origin in the robot's file"),
-    ("axis", "link"): Wording("axis turned by {size}", by="its axis in the robot's file"),
-    ("payload", "link"): Wording("a payload from {instant} on", by="the log up to there, or idbench payload"),
-    ("collision", "torque"): Wording("a push of {size} at {instant}", by="the log without it"),
+    ("backlash", "drive"): Wording("play of {size}", by="measure positions at the link"),
+    ("elasticity", "drive"): Wording("compliance of {size}", by="measure positions at the link, or move more slowly"),
+    ("length", "link"): Wording("origin of the joint off by {size} along {axis}", by="correct its origin in the robot's file"),
+    ("axis", "link"): Wording("axis turned by {size}", by="correct its axis in the robot's file"),
+    ("payload", "link"): Wording("a payload from {instant} on", by="take the log up to there, or idbench payload"),
+    ("collision", "torque"): Wording("a push of {size} at {instant}", by="cut it out of the log"),
     ("tilt", "base"): Wording("the base is tilted by {size}", "--gravity {gravity}"),
     ("gravity", "base"): Wording("gravity points elsewhere, or is not in the torques", "--gravity {gravity}"),
-    ("base_motion", "base"): Wording("the base moves, {size}", by="a stiffer stand, or slower motion"),
-    ("rate", "clock"): Wording("the motion is {size} {faster} than t says", by="the unit of t, or fs"),
+    ("base_motion", "base"): Wording("the base moves, {size}", by="take a stiffer stand, or move more slowly"),
+    ("rate", "clock"): Wording("the motion is {size} {faster} than t says", by="correct the unit of t, or fs"),
     ("clock_drift", "clock"): Wording(
-        "clocks of positions and torques drift apart by {size}", by="one clock, or a shorter log"
+        "clocks of positions and torques drift apart by {size}", by="log with one clock, or take a shorter log"
     ),
-    ("exchanged", "torque"): Wording("its torque is exchanged with that of {other}", by="the order of the columns: --columns"),
-    ("missing_torque", "torque"): Wording("its torque was not logged", by="a log with it"),
+    ("exchanged", "torque"): Wording(
+        "its torque is exchanged with that of {other}", by="exchange their columns: --columns tau=..."
+    ),
+    ("exchanged", "position"): Wording(
+        "its position is exchanged with that of {other}", by="exchange their columns: --columns q=..."
+    ),
+    ("missing_torque", "torque"): Wording(
+        "its torque never changes: it was not logged, and its rows are left out", by="log it"
+    ),
 }
 """Every cause of the table of mistakes, and what it is a mistake of."""
 
@@ -96,6 +105,8 @@ class Cause:
     """The robot."""
     log: MotionLog
     """The first log."""
+    gains: Sequence[float] = ()
+    """Gains with which it was read, of all joints or of each, where some were given."""
 
     @property
     def joint(self) -> str | None:
@@ -113,6 +124,11 @@ class Cause:
         return f"{before}{what}{t}{f'; or {others}, which this log cannot distinguish' if others else ''}"
 
     @property
+    def short(self) -> str:
+        """What is wrong, alone."""
+        return self._wording.what.format(**self._values)
+
+    @property
     def remedy(self) -> str:
         """The option that mends it; empty if none does."""
         if self._wording.law and self.robot_model.laws.smooth:
@@ -122,16 +138,18 @@ class Cause:
     @property
     def mends(self) -> str:
         """What mends it, an option or else."""
-        return self.remedy or self._wording.by or "another law of friction"
+        return self.remedy or self._wording.by or "take another law of friction"
 
     @property
     def advice(self) -> str:
         """What is wrong, what mends it, and what that gains on stretches of the log that were not fitted."""
         before, after = (error_percentage(x) for x in self.suspect.held_out)
         gain = (
-            "" if np.isinf(self.suspect.t) else f"; without it, the error on held-out stretches falls from {before} to {after}"
+            ""
+            if not any(self.suspect.held_out)
+            else f"; without it, the error on held-out stretches falls from {before} to {after}"
         )
-        return f"{self.words}{gain}; try {self.mends}"
+        return f"{self.words}{gain}; {'try ' if self.remedy else ''}{self.mends}"
 
     def summary(self) -> dict[str, Any]:
         """Return what a summary.json says of it."""
@@ -149,6 +167,7 @@ class Cause:
             "remedy": self.mends,
             "held_out": list(s.held_out),
             "instant": s.instant,
+            "log": None if s.log is None else s.log + 1,
         }
 
     @property
@@ -189,12 +208,13 @@ class Cause:
         if any(word in self._wording.what for word in ("{large}", "{late}", "{faster}")):
             size = abs(size)
         j = s.joint or 0
-        gains = np.broadcast_to(np.asarray(self.log.torque.gain), (len(joints),)).copy()
+        given = np.asarray(self.gains if len(self.gains) else 1.0) * np.asarray(self.log.torque.gain)
+        gains = np.broadcast_to(given, (len(joints),)).copy()
         gains[j] *= -1.0 if s.cause == "sign" else 1 / (1 + s.size[0]) if s.cause == "gain" else 1.0
         last = min(j + 1, len(joints) - 1)
         return {
             "size": f"{size:.3g} +- {sigma:.1g}{unit}" if sigma else f"{size:.3g}{unit}",
-            "instant": "" if s.instant is None else f"{s.instant:.1f} s",
+            "instant": "" if s.instant is None else f"{s.instant:.1f} s{'' if s.log is None else f' of log {s.log + 1}'}",
             "large": "large" if s.size[0] > 0 else "small",
             "late": "late" if s.size[0] > 0 else "early",
             "faster": "faster" if s.size[0] > 0 else "slower",
@@ -212,10 +232,11 @@ class Cause:
         """Return gravity as it would be without the mistake [m/s^2]."""
         g = self.robot_model.tree.gravity
         if self.suspect.cause == "gravity":
-            return np.round(self.suspect.size, 1) + 0.0
+            return np.round(self.suspect.size, 2) + 0.0
         if self.suspect.cause == "tilt" and np.any(g):
             axes = np.linalg.svd(g[None])[2][1:]
-            return np.asarray(g + sum(size * np.cross(a, g) for size, a in zip(self.suspect.size, axes, strict=False)))
+            turned = g + sum(size * np.cross(a, g) for size, a in zip(self.suspect.size, axes, strict=False))
+            return np.asarray(turned * np.linalg.norm(g) / np.linalg.norm(turned))
         return g
 
     def _named(self, other: tuple[str, int | None]) -> str:

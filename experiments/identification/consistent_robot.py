@@ -11,7 +11,7 @@ import numpy as np
 from idbench.experiments.identification.consistent_estimate import consistent_of
 from idbench.experiments.identification.fit import Fit
 from idbench.identify import Array, Consistent
-from idbench.identify.basis.block import FRICTION, named
+from idbench.identify.basis.block import FRICTION
 from idbench.sim.robot.rewrite import compiled, rewritten
 from idbench.sim.robot.robot import Robot
 from idbench.sim.robot.tree import standard_parameters
@@ -44,10 +44,7 @@ class WrittenRobot:
     def values(self) -> dict[str, float]:
         """The standard parameters by name; those that were not asked for are zero."""
         found, robot_model = self.consistent, self.fit.robot_model
-        without = {named("Ia", j): 0.0 for j in range(robot_model.basis.n)} if robot_model.asked.armature == "none" else {}
-        for letters, law in (("Fv", "viscous"), ("Fs", "coulomb")):
-            without |= {named(letters, j): 0.0 for j, own in enumerate(robot_model.laws.names) if law not in own}
-        return without | robot_model.equal(dict(zip(found.names, map(float, found.standard), strict=True)))
+        return robot_model.equal(dict(zip(found.names, map(float, found.standard), strict=True)))
 
     def text(self, folder: Path | None = None) -> str:
         """Return the file, to stand in a folder; in that of the robot's own file by default."""
@@ -76,16 +73,26 @@ class WrittenRobot:
             smooth = {p.name for p in self.fit.basis.parameters if p.is_random_effect}
             others = [name for name in self.lost if name not in smooth]
             names = ", ".join([*others, *(["smooth functions of friction"] if smooth & self.lost.keys() else [])])
-            messages.append(f"{names} have no place in an MJCF file and are left out")
+            messages.append(f"{names} have no place in the file and are left out")
         return messages
 
     @property
     def torque_off(self) -> Array:
         """Rms of the torque by which the robot differs from the estimate, over that of the log, shape (joint,)."""
-        problem, estimate = self.fit.problem, self.fit.estimates[self.model]
-        X = np.array([self.consistent.base[self.fit.robot_model.grouping.basis.places[p]] for p in problem.basis.parameters])
+        return self._share(self.consistent.base, self.fit.estimates[self.model].X)
+
+    def share_of(self, names: Collection[str]) -> Array:
+        """Return the rms torque that standard parameters make, over that of the log, shape (joint,)."""
+        found = self.consistent
+        own = np.array([x if name in names else 0.0 for name, x in zip(found.names, found.standard, strict=True)])
+        return self._share(self.fit.robot_model.grouping.base(own))
+
+    def _share(self, base: Array, without: Array | float = 0.0) -> Array:
+        """Return the rms torque of base values, beside that of an estimate X, over that of the log, shape (joint,)."""
+        places, problem = self.fit.robot_model.grouping.basis.places, self.fit.problem
+        X = np.array([base[places[p]] for p in problem.basis.parameters]) - without
         R = problem.factors.R
-        squares = [np.sum(x**2, axis=-1) for x in (R[..., :-1] @ (X - estimate.X), R[..., -1])]
+        squares = [np.sum(x**2, axis=-1) for x in (R[..., :-1] @ X, R[..., -1])]
         return np.sqrt(np.divide(squares[0], squares[1], out=np.zeros_like(squares[0]), where=squares[1] > 0))
 
     @property

@@ -7,30 +7,24 @@ from typing import Any, Self, final
 import numpy as np
 
 from idbench.experiments.identification.causes import Cause
-from idbench.experiments.identification.friction_choice import chosen_in_turns, masked_laws, suited_mask
 from idbench.experiments.identification.logs import Logs
-from idbench.experiments.identification.prior_share import chosen_share
 from idbench.experiments.identification.rates import CONTROLLER, Rates
 from idbench.experiments.identification.request import Request
 from idbench.experiments.identification.robot_model import RobotModel
-from idbench.experiments.identification.smooth_friction import smoothed
 from idbench.experiments.results.writing import finite, summarize
 from idbench.identify import (
-    ESTIMATORS,
-    MODELS,
     AbstractEstimator,
     Array,
     Basis,
     Chain,
     Estimate,
-    ExcitationError,
     IdentificationError,
     Problem,
-    attempt_each,
     encoder_steps,
 )
 from idbench.identify.judge.diagnosis import diagnosed
 from idbench.identify.judge.friction_choice import FrictionChoice
+from idbench.identify.judge.suspect import Suspect
 from idbench.identify.judge.torque_interval import TorqueInterval, torque_interval
 from idbench.identify.rows.rows import Rows
 
@@ -39,58 +33,6 @@ NOTHING = 1e-12
 
 Outcomes = dict[str, Estimate | IdentificationError]
 """The estimate of every model, or why it has none."""
-
-
-def fit(request: Request, logs: Logs) -> "Fit":
-    """Return logs, identified: laws of friction chosen where that is asked for, what the logs do not show left out.
-
-    Raises
-    ------
-    IdentificationError
-        If no model has an estimate.
-    """
-    choice = None
-    if request.robot_model.laws.auto:
-        request, logs, choice = chosen_in_turns(request, logs)
-    if request.robot_model.laws.smooth:
-        request = smoothed(request, logs.fitted)
-    if request.robot_model.share_sought:
-        request = replace(request, share=chosen_share(request, logs.fitted))
-    problem = request.problem(logs.fitted)
-    (speeds, raised), hidden = suited_mask(problem), list[str]()
-    if raised:
-        request, before = replace(request, mask_speed=speeds), problem
-        problem = request.problem(logs.fitted)
-        if masked := masked_laws(before, problem):
-            request = replace(request, robot_model=request.robot_model.without(masked))
-            problem, hidden = request.problem(logs.fitted), list(masked)
-    found = _fit(request, logs, problem)
-    leading = next(iter(found.outcomes.values()))
-    while isinstance(leading, ExcitationError) and leading.hidden and len(leading.hidden) < len(found.basis.names):
-        hidden += leading.hidden
-        request = replace(found.request, robot_model=found.robot_model.without(leading.hidden))
-        found = _fit(request, logs, request.problem(logs.fitted))
-        leading = next(iter(found.outcomes.values()))
-    if not found.estimates and isinstance(leading, IdentificationError):
-        raise _with_its_cause(found, leading)
-    return replace(found, choice=choice, hidden=tuple(hidden), raised=raised)
-
-
-def _with_its_cause(found: "Fit", error: IdentificationError) -> IdentificationError:
-    """Return why nothing was estimated, with the residuals of least squares, if they depend on the motion."""
-    if isinstance(error, ExcitationError) or found.solver.filtered:
-        return error
-    try:
-        suspects = diagnosed(found.problem, ESTIMATORS.create("GLS").fit(found.problem.explicit).X)
-    except (IdentificationError, np.linalg.LinAlgError):
-        return error
-    causes = [Cause(each, found.robot_model, found.logs.fitted[0]).advice for each in suspects]
-    return IdentificationError(f"{error}; with GLS, {'; '.join(causes)}") if causes else error
-
-
-def _fit(request: Request, logs: Logs, problem: Problem) -> "Fit":
-    found = attempt_each(problem, {name: MODELS.create(name) for name in request.models}, request.solver)
-    return Fit(request, logs, problem, found)
 
 
 @final
@@ -110,6 +52,8 @@ class Fit:
     """What was compared, where laws of friction were chosen."""
     hidden: tuple[str, ...] = ()
     """Parameters that were left out because the logs do not show them."""
+    silent: tuple[Suspect, ...] = ()
+    """Joints whose torques never change though they move: they were not logged, and their rows are left out."""
     raised: tuple[int, ...] = ()
     """Joints whose mask was made to reach farther, since their friction in slow motion is not that of faster motion."""
 
@@ -140,7 +84,8 @@ class Fit:
             suspects = diagnosed(self.problem, self.estimates[self.leading].X)
         except (IdentificationError, np.linalg.LinAlgError):  # an estimate is not lost because its tests are
             return None
-        return tuple(Cause(each, self.robot_model, self.logs.fitted[0]) for each in suspects)
+        log, gains = self.logs.fitted[0], self.logs.gains
+        return tuple(Cause(each, self.robot_model, log, gains) for each in (*self.silent, *suspects))
 
     @cached_property
     def truth(self) -> dict[str, float] | None:
@@ -149,8 +94,10 @@ class Fit:
         return None if known is None else {name: known.get(name, 0.0) for name in self.basis.names}
 
     @cached_property
-    def rates(self) -> Rates:
-        """Sampling and filter frequencies, in multiples of the bandwidth of the position loop."""
+    def rates(self) -> Rates | None:
+        """Sampling and filter frequencies, in multiples of the bandwidth of the position loop; None of poses at rest."""
+        if self.logs.fitted[0].poses:
+            return None
         stated, source = self.request.wdyn or (None, "from the motion; give the loop's bandwidth with --wdyn")
         if stated is None and self.request.loops and (own := self.request.loops[0].wdyn):
             stated, source = own, CONTROLLER
@@ -273,7 +220,7 @@ class Fit:
             "failures": self.failures,
             "hidden": list(self.hidden),
             "mask_speed": list(self.request.mask_speed),
-            "rates": self.rates.summary(),
+            "rates": self.rates and self.rates.summary(),
             **self.robot_model.stated,
             **({"share": self.request.share} if self.request.share else {}),
             "cutoff": cutoff,

@@ -8,11 +8,12 @@ from typing import Any
 
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.chain_settings import chain_of
-from idbench.experiments.identification.fit import Fit, fit
+from idbench.experiments.identification.fit import Fit
+from idbench.experiments.identification.fitting import fit
 from idbench.experiments.identification.friction_choice import summary, words
 from idbench.experiments.identification.iterations import iterations
 from idbench.experiments.identification.load import Loaded, in_band, load, with_held_out
-from idbench.experiments.identification.log_warnings import warnings_of_log
+from idbench.experiments.identification.log_warnings import unchanging, warnings_of_log
 from idbench.experiments.identification.logs import Logs
 from idbench.experiments.identification.rates import CONTROLLER
 from idbench.experiments.identification.reading import ReadOptions, file_of, stated_by
@@ -107,7 +108,8 @@ def fit_of(request: Request, logs: Logs) -> Fit:
     try:
         return fit(request, logs)
     except IdentificationError as error:
-        doubts = dict.fromkeys(doubt for log in logs.fitted for doubt in warnings_of_log(log, request.robot_model.tree))
+        tree = request.robot_model.tree
+        doubts = dict.fromkeys(x for log in logs.fitted for x in (*warnings_of_log(log, tree), *unchanging(log, tree)))
         why = f"; what is suspicious: {'; '.join(doubts)}" if doubts else ""
         raise ExperimentError(f"{error}{why}") from error
 
@@ -122,7 +124,7 @@ def notes_of(made: Fit) -> tuple[str, ...]:
     """Return what was read, done and assumed, and which laws of friction were chosen."""
     robot_model, choice = made.robot_model, made.choice
     laws = () if choice is None else words(choice, robot_model.laws.names, robot_model.robot.joints)
-    return (*made.logs.notes, *laws)
+    return (*made.logs.notes, *(f"the robot's file has {note}" for note in robot_model.robot.notes), *laws)
 
 
 def truth_of(asked: IdentifyRequest, request: Request) -> dict[str, float] | None:

@@ -10,8 +10,10 @@ import numpy as np
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.chain_settings import with_cutoff
 from idbench.experiments.identification.logs import Logs, sought_of
+from idbench.experiments.identification.poses import of_poses
 from idbench.experiments.identification.reading import ReadLog, ReadOptions, file_of, late, read, read_as, with_delays
 from idbench.experiments.identification.request import Request
+from idbench.experiments.identification.simulated_logs import SimulatedLogs
 from idbench.experiments.text import of_each
 from idbench.identify import LogError, MotionLog
 from idbench.identify.judge.band import Band
@@ -31,6 +33,8 @@ class Loaded:
     """The logs."""
     notes: tuple[str, ...]
     """What was read, done and assumed."""
+    simulated: SimulatedLogs | None = None
+    """How torques are read that are those of a simulation."""
 
     def logs(self, some: slice = slice(None)) -> tuple[MotionLog, ...]:
         """Return some of the logs, or the pieces of those with gaps."""
@@ -76,18 +80,26 @@ def load(paths: Sequence[Path], options: ReadOptions, request: Request, *, band:
 def prepared(every: Sequence[ReadLog], request: Request, *, sought: str | None, band: bool, more: int = 0) -> Loaded:
     """Return logs of one fit that were read, with the band that suits them and, if it is sought, the delay of their torques."""
     _require_other_samples(every)
-    of_band = list[str]()
-    if band:
+    of_band, logs = list[str](), [log for one in every for log in one.logs]
+    simulated = None
+    if any(log.poses for log in logs):
+        request = of_poses(request, logs, band=band, sought=sought)
+    if band and not logs[0].poses:
         p, least = len(request.robot_model.basis.names) + more, request.processing.operator.cutoff  # type: ignore[attr-defined]
-        needed = Band.of([log for one in every for log in one.logs], p, least)
-        if needed.cutoff > least:
-            request, of_band = in_band(request, needed.cutoff), [needed.words(p, least)]
+        needed = Band.of(logs, p, least)
+        if needed.cutoff != least:
+            mask, of_band = request.processing.mask, [needed.words(p, least)]
+            request = in_band(request, needed.cutoff)
+            if needed.cutoff < least:  # edges of a mask that are as long as a slow log's moves would leave nothing
+                request = replace(request, method=(replace(request.processing, mask=mask), request.solver))
     if sought:
         with stage("the delay of the torques"):
             every = with_delays(every, request, sought)
+    if not logs[0].poses and (simulated := SimulatedLogs.of(every, request)):  # at the delays that were found
+        every = [simulated.acting(read) for read in every]
     named = zip(every, _names(every), strict=True)
     said = of_each((name, note) for one, name in named for note in one.notes) if len(every) > 1 else every[0].notes
-    return Loaded(request, tuple(every), tuple(dict.fromkeys([*said, *of_band])))
+    return Loaded(request, tuple(every), tuple(dict.fromkeys([*said, *of_band])), simulated)
 
 
 def in_band(request: Request, cutoff: float) -> Request:
@@ -118,13 +130,19 @@ def with_held_out(loaded: Loaded, paths: Sequence[Path], options: ReadOptions, t
 def judged_on(loaded: Loaded, every: Mapping[str, ReadLog], truth: Mapping[str, float] | None, sought: str | None) -> Logs:
     """Return logs of a fit with held-out logs that were read, by name."""
     said = list[tuple[str, str]]()
+    if loaded.simulated:
+        every = {name: loaded.simulated.acting(one) for name, one in every.items()}
     for name, one in every.items():
         pieces = [f"of its {len(one.logs)} pieces the longest is judged"] if len(one.logs) > 1 else []
         said += [(one.path.name, note) for note in (*one.notes, *pieces)]
+        if one.longest.poses != loaded.logs()[0].poses:
+            kinds = ("poses at rest", "motion") if one.longest.poses else ("motion", "poses at rest")
+            raise ExperimentError(f"--validate {name} is of {kinds[0]}, what is identified of {kinds[1]}: give another log")
         if any(within(one.longest, log) for log in loaded.logs()):
             raise ExperimentError(f"--validate {name} holds the motion that is identified: give another motion, or none")
     held_out, notes = {name: one.longest for name, one in every.items()}, (*loaded.notes, *of_each(said))
-    return Logs(loaded.logs(), loaded.names, held_out, notes, truth, sought, tuple(every.values()))
+    gains = loaded.read[0].columns.gain
+    return Logs(loaded.logs(), loaded.names, held_out, notes, truth, sought, gains, tuple(every.values()))
 
 
 def require_different(paths: Sequence[Path]) -> None:

@@ -36,7 +36,10 @@ def unlike_file(fit: Fit) -> list[str]:
     ratios = {part: float(found / stated) for part, (found, stated) in every.items() if stated}
     words = f"the torques are {measured / expected[j]:.2g} times what the robot's file says of this motion"
     far = [part for part, ratio in ratios.items() if _far(ratio)]
-    if len(far) == len(ratios):
+    unstated = [part for part, (found, stated) in every.items() if not stated and found]
+    if not far:  # what the file does not state makes the rest
+        return []
+    if len(far) == len(ratios) and not unstated:
         return [f"{words}: are they in N m?"]
     each = ", ".join(f"its {part} {ratio:.2g} times" for part, ratio in ratios.items())
     return [f"{words}, {each} at {robot_model.robot.joints[j]}: are the file's values of {' and '.join(far)} placeholders?"]
@@ -88,9 +91,13 @@ def warnings_of_log(log: MotionLog, tree: KinematicTree) -> list[str]:
         reason = "" if j in jumping else _reason(joint, ends)
         if reason:
             by_reason.setdefault(reason, []).append(f"{joint.name} goes from {ends[0]:.4g} to {ends[1]:.4g}")
-    found += [f"{', '.join(each)}{reason}" for reason, each in by_reason.items()]  # all joints in degrees are one line
-    dead = [joint.name for joint, tau in zip(tree.joints, log.tau.reshape(-1, log.n).T, strict=True) if not np.ptp(tau)]
-    return found + ([f"the torque of {', '.join(dead)} never changes: is it logged?"] if dead else [])
+    return found + [f"{', '.join(each)}{reason}" for reason, each in by_reason.items()]  # all joints in degrees are one line
+
+
+def unchanging(log: MotionLog, tree: KinematicTree) -> list[str]:
+    """Return which torques never change: nobody drives the joint, or its torque was not logged, as rows of a fit show."""
+    dead = ", ".join(tree.joints[j].name for j in log.unchanging)
+    return [f"the torque of {dead} never changes: is it logged?"] if dead else []
 
 
 def unusable(log: MotionLog) -> bool:
@@ -99,7 +106,7 @@ def unusable(log: MotionLog) -> bool:
 
 
 def _jumps(log: MotionLog) -> list[Jump]:
-    return jumps(log.q, log.fs) if log.q.ndim == 2 else []
+    return jumps(log.q, log.fs) if log.q.ndim == 2 and not log.poses else []
 
 
 def _of_jumps(log: MotionLog, tree: KinematicTree) -> Iterator[str]:

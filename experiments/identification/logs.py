@@ -74,7 +74,10 @@ class LogFacts:
         """Yield what is worth knowing of the whole log."""
         yield from self.repaired.words(self.joints)
         yield f"torques exceed their noise up to {content_end(self.log):.3g} Hz"
-        dead = [row["joint"] for row in self.rows if row["tau"][0] == row["tau"][1]]
+        absent = self.columns.missing
+        dead = [row["joint"] for j, row in enumerate(self.rows) if row["tau"][0] == row["tau"][1] and j not in absent]
+        if absent:
+            yield f"there is no torque of {', '.join(self.joints[j] for j in absent)}: a fit leaves its rows out"
         if dead:
             yield f"the torque of {', '.join(dead)} never changes: is it logged?"
         still = [row["joint"] for row in self.rows if row["q"][0] == row["q"][1]]
@@ -130,6 +133,8 @@ class Logs:
     """The true parameters, where they are known."""
     delay_sought: str | None = None
     """Which delay of the torques was estimated, of `DELAYS`, and may be estimated again with more laws of friction."""
+    gains: tuple[float, ...] = ()
+    """Torque over what the file of the first has, joint by joint, where it was multiplied by that."""
     read_held_out: tuple["ReadLog", ...] = ()
     """Held-out logs as they were read."""
 
@@ -156,6 +161,15 @@ class Logs:
             notes=(*self._notes, f"{WITH_LAWS}: {said}"),
         )
         return delayed, moved
+
+    def without_torque(self, joint: int) -> "Logs":
+        """Return the logs without the torque of a joint, from 0, where it never changes: it was not logged there."""
+
+        def quiet(log: MotionLog) -> MotionLog:
+            return replace(log, missing=(*log.missing, joint)) if joint in log.unchanging else log
+
+        held_out = self.held_out and {name: quiet(log) for name, log in self.held_out.items()}
+        return replace(self, fitted=tuple(map(quiet, self.fitted)), held_out=held_out)
 
     @property
     def _notes(self) -> tuple[str, ...]:

@@ -11,6 +11,7 @@ import numpy as np
 
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.logs import DELAYS, with_delay
+from idbench.experiments.identification.poses import are_poses, poses_of
 from idbench.experiments.identification.request import Request
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.requests.shared import ColumnOptions
@@ -22,9 +23,6 @@ from idbench.identify.files.formats import read_table
 from idbench.identify.files.layout import LogLayout
 from idbench.identify.files.reading import LAYOUT_FILE, layout_of, read_columns
 from idbench.identify.judge.delay import DelayEstimate
-
-SLOWEST = 0.5
-"""Sampling period [s] that no robot's log has: its times are in another unit."""
 
 LATEST = 1.0
 """Delay [s] that no torque of a log has."""
@@ -90,6 +88,8 @@ class ReadLog:
     """What was done to its clock, if that was asked for."""
     notes: tuple[str, ...] = ()
     """What was done or assumed."""
+    simulated: bool = False
+    """Whether it is stated to be of MuJoCo's simulation of the robot's file."""
 
     @property
     def longest(self) -> MotionLog:
@@ -108,27 +108,33 @@ def read(path: Path, options: ReadOptions, robot_model: RobotModel | None) -> Re
     hinges = [True] * columns.n if robot_model is None else [joint.kind == "hinge" for joint in robot_model.tree.joints]
     stated = columns.torque or options.fallback
     channel = channel_of(stated, _meaning(path, options, stated), options.delay)
-    _require_seconds(path, columns.t)
+    poses = are_poses(path, columns, stated=options.columns.poses)
     if not np.any(columns.tau) and np.ptp(columns.q, axis=0).any():
         raise ExperimentError(f"{path}: all torques are 0: there is nothing to identify")
     columns = replace(columns, q=_turned(path, columns.q, names, hinges, options.unwrap))
-    assumed = options.delay is None and stated is None
+    assumed = options.delay is None and stated is None and not options.columns.simulated
     notes = [columns.said] if columns.said else []
+    absent = ", ".join(names[j] for j in columns.missing)
+    notes += [f"the log has no torque of {absent}: its rows are left out, and what only they would show"] if absent else []
+    notes += ["no positions were logged: velocities are integrated, from 0"] if columns.integrated else []
     notes += [f"names of the log's joints have {before!r} before those of the robot's"] if before else []
+    if poses:
+        log, said = poses_of(columns, channel)
+        return ReadLog(path, (log,), columns, channel, None, (*notes, said))
     notes += ["no --torque-delay was given, 0 is assumed: `estimate` finds it"] if assumed else []
     if options.columns.resample or columns.t_tau is not None:
         repaired = Repaired.of(columns, channel)
         words = [*repaired.words(names), *notes]
-        return ReadLog(path, repaired.logs, columns, channel, repaired, tuple(words))
+        return ReadLog(path, repaired.logs, columns, channel, repaired, tuple(words), options.columns.simulated)
     try:
-        log = MotionLog.at_times(columns.t, columns.q, columns.tau, channel, columns.conditions)
+        log = MotionLog.at_times(columns.t, columns.q, columns.tau, channel, columns.conditions, columns.missing)
     except TimeError as error:
         late = f" --torque-delay {channel.delay:g}" if channel.delay else ""
         raise ExperimentError(
             f"{path}: {error}: add --resample, or write it anew and look: uv run idbench resample {shlex.quote(str(path))} "
             f"--torque {channel.meaning}{late} --out uniform.parquet"
         ) from error
-    return ReadLog(path, (log,), columns, channel, None, tuple(notes))
+    return ReadLog(path, (log,), columns, channel, None, tuple(notes), options.columns.simulated)
 
 
 def _ordered(path: Path, columns: LogColumns, robot_model: RobotModel | None) -> tuple[LogColumns, str]:
@@ -147,11 +153,17 @@ def _ordered(path: Path, columns: LogColumns, robot_model: RobotModel | None) ->
 
 def _meaning(path: Path, options: ReadOptions, stated: TorqueChannel | None) -> Meaning:
     """Return what the torque of a log means; raise ExperimentError if nobody says it."""
-    meaning = options.torque or (stated.meaning if stated else None)
+    if options.columns.simulated and options.torque not in (None, "instantaneous"):
+        raise ExperimentError(
+            f"--simulated --torque {options.torque}: torques of MuJoCo are instantaneous, beside the positions about which it "
+            "steps: leave --torque out"
+        )
+    meaning = options.torque or (stated.meaning if stated else "instantaneous" if options.columns.simulated else None)
     if meaning is None:
         raise ExperimentError(
             f"{path} does not say what its torque means: add --torque held (a controller's command), instantaneous (a "
-            "measurement) or averaged, and --torque-delay SECONDS or estimate"
+            "measurement) or averaged, and --torque-delay SECONDS or estimate; or --simulated, if it is of MuJoCo's simulation "
+            "of the robot's file"
         )
     return meaning
 
@@ -241,15 +253,6 @@ def _joints_of(columns: LogColumns, robot_model: RobotModel) -> str:
         return ""
     those = columns.joints if set(columns.joints) <= set(known) and columns.joints else known[: columns.n]
     return f", or the joints that it has: --joints {' '.join(those)} (the others are held at 0, or where --lock says)"
-
-
-def _require_seconds(path: Path, t: Array) -> None:
-    """Raise ExperimentError if times are those of a log in another unit."""
-    step = float(np.median(np.diff(t))) if len(t) > 1 and np.isfinite(t).all() else 0.0
-    if step >= SLOWEST:
-        raise ExperimentError(
-            f"{path} has a sample every {step:.4g} s, if t is in s: is it in ms, us or ns? Then add --units t=ms, t=us or t=ns"
-        )
 
 
 def _turned(path: Path, q: Array, names: Sequence[str], hinges: Sequence[bool], unwrap: bool) -> Array:

@@ -13,6 +13,7 @@ from idbench.experiments.identification.friction_laws import FrictionLaws, balan
 from idbench.experiments.identification.known import Known, RoughlyKnown
 from idbench.experiments.requests.shared import Parameters
 from idbench.identify import BLOCKS, AbstractJointLaw, BaseParameters, Basis, KinematicTree, SettingError, tree_basis
+from idbench.identify.basis.block import named
 from idbench.identify.parameters.base_parameters import in_letters_of_the_paper
 from idbench.identify.rows.factors import AbstractPrior
 from idbench.identify.tables import html_table, text_table
@@ -187,9 +188,16 @@ class RobotModel:
             raise ExperimentError(f"--tie: {error}") from error
 
     def equal(self, values: Mapping[str, float]) -> dict[str, float]:
-        """Return standard values with what is held, and what is tied to others, beside those that are given."""
+        """Return standard values with what is held, tied to others, or not asked for, beside those that are given."""
         tied = {p.name: values[other.name] for p, other in self.grouping.standard.tied.items() if other.name in values}
-        return {**self.held, **values, **tied}
+        return {**self._unasked(), **self.held, **values, **tied}
+
+    def _unasked(self) -> dict[str, float]:
+        """Return what the robot's file may have and the identification says is zero: rotors, laws of friction."""
+        found = {named("Ia", j): 0.0 for j in range(self.robot.n)} if self.asked.armature == "none" else {}
+        for letters, law in (("Fv", "viscous"), ("Fs", "coulomb")):
+            found |= {named(letters, j): 0.0 for j, own in enumerate(self.laws.names) if law not in own}
+        return found
 
     def _with_laws(self, basis: Basis) -> Basis:
         for name in self.asked.add:

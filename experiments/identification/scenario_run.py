@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from idbench.experiments.errors import ExperimentError
-from idbench.experiments.identification.fit import Fit, fit
+from idbench.experiments.identification.fit import Fit
+from idbench.experiments.identification.fitting import fit
 from idbench.experiments.identification.iterations import iterations
 from idbench.experiments.identification.logs import Logs
 from idbench.experiments.identification.request import Request

@@ -156,7 +156,7 @@ class RobotPlant(AbstractPlant):
     def shoot(self, X: Array, q: Array, qd: Array, log: MotionLog, first: npt.NDArray[np.intp], count: int) -> Array:
         """Return the positions of robots that start somewhere in a log."""
         try:
-            return shoot(self._fields.robot, self._fields.of(X), q, qd, log, first, count)
+            return shoot(self._fields.robot, self._fields.of(X), (q, qd), log, first, count)
         except BenchError as error:
             raise IdentificationError(f"the robot cannot be simulated: {error}") from error
 

@@ -10,13 +10,15 @@ import numpy as np
 
 from idbench.experiments.identification.causes import Cause
 from idbench.experiments.identification.consistent_robot import WrittenRobot
-from idbench.experiments.identification.fit import Fit, fit
+from idbench.experiments.identification.fit import Fit
+from idbench.experiments.identification.fitting import fit
 from idbench.experiments.judgement.warnings import wrong_sign
 from idbench.experiments.results.writing import finite
 from idbench.experiments.text import error_percentage
 from idbench.identify import Array, Basis, IdentificationError, MotionLog, Problem, State, Validation, split, validate
 from idbench.identify.arrays import combined
 from idbench.identify.basis.block import FRICTION, NOT_NEGATIVE, Parameter
+from idbench.identify.data.motion_log import never_logged
 from idbench.identify.judge.validation import MARGIN
 from idbench.identify.rows.rows import manageable
 from idbench.sim.engine.driven import Replay, replay
@@ -58,14 +60,17 @@ class Verdict:
         """good, fair or poor; unsure where noise or sigma would hide a poor model. None is good that shows a mistake."""
         if self.wrong:
             return "poor"
-        beyond, hidden = (
-            _worst(self.validation.percent_of_level(x)) for x in (self.validation.excess, self.validation.expected)
-        )
+        beyond, hidden = (_worst(self.validation.percent_of_level(x)) for x in (self.validation.excess, self._hidden))
         if beyond > FAIR:
             return "poor"
         if hidden > FAIR or not np.isfinite(self.validation.percent).any():
             return "unsure"
         return "good" if beyond <= GOOD and not self.causes else "fair"
+
+    @property
+    def _hidden(self) -> Array:
+        """Error of the model that noise and sigma could hide, shape (joint,) [N m]: at most what was found."""
+        return np.minimum(self.validation.expected, self.validation.rms)
 
     @cached_property
     def reasons(self) -> list[str]:
@@ -83,7 +88,7 @@ class Verdict:
         worst = int(np.nan_to_num(validation.percent, posinf=np.inf).argmax())
         others = ", the others by less" if len(joints) > 1 and j == worst else ""
         yield f"the torque of {joints[j]} is off by {error_percentage(validation.percent[j])}{others}; {self._expected(j)}"
-        hidden = validation.percent_of_level(validation.expected)
+        hidden = validation.percent_of_level(self._hidden)
         worst = int(np.nan_to_num(hidden).argmax())
         if self.word == "unsure":
             share_of = error_percentage(hidden[worst])
@@ -117,6 +122,9 @@ def _worst(shares: Array) -> float:
 BANDWIDTH = 5.0
 """Of the loop that holds the simulated robot to the log [rad/s]: weak, so that errors of the model show."""
 
+SAME = 1e-3
+"""Share of a standard error up to which parameters of two models are the same: implicit differs from explicit by 1e-5."""
+
 SHAPE = "shape of friction"
 """Kind of parameters that enter nonlinearly."""
 
@@ -126,7 +134,9 @@ LONGEST = 60.0
 
 def on_log(result: Fit, name: str, log: MotionLog) -> "HeldOut":
     """Return a fit on another log; of a long one on its beginning."""
-    return HeldOut(result, manageable([log])[0], f"held-out log {name}", result.diagnosis or ())
+    missing = {*log.missing, *never_logged(result.logs.fitted)}  # of what only their rows would show nothing is known
+    one = replace(manageable([log])[0], missing=tuple(missing))
+    return HeldOut(result, one, f"held-out log {name}", result.diagnosis or ())
 
 
 def on_last_quarter(result: Fit) -> "HeldOut":
@@ -161,7 +171,10 @@ class HeldOut:
     @cached_property
     def torques(self) -> dict[str, Validation]:
         """How well each model predicts the torques."""
-        return {model: validate(self.problem, e.X, e.within_covariance) for model, e in self.fit.estimates.items()}
+        return {
+            model: validate(self.problem, e.X, e.within_covariance, e.noise_levels.torque)
+            for model, e in self.fit.estimates.items()
+        }
 
     def within_interval(self, model: str) -> tuple[Array, float] | None:
         """Return the share of each joint's torques within the fit's intervals, and that of the log outside the fit."""
@@ -171,7 +184,16 @@ class HeldOut:
     @cached_property
     def replays(self) -> dict[str, Replay | str]:
         """What the robot with each model's parameters does with the torques of the log, or why that is not known."""
-        return {model: self._replay(model) for model in self.fit.estimates}
+        found = dict[str, Replay | str]()
+        for model in self.fit.estimates:
+            same = next((other for other in found if self._agree(model, other)), None)
+            found[model] = self._replay(model) if same is None else found[same]
+        return found
+
+    def _agree(self, model: str, other: str) -> bool:
+        """Return whether the parameters of two models are the same, far within their standard errors."""
+        one, two = self.fit.estimates[model], self.fit.estimates[other]
+        return bool((np.abs(one.X - two.X) <= SAME * one.standard_errors).all())
 
     @cached_property
     def verdicts(self) -> dict[str, Verdict]:
@@ -197,6 +219,11 @@ class HeldOut:
             If there is no such robot.
         """
         written, (log, qd) = WrittenRobot(self.fit, model), self._replayed
+        if log.missing:
+            names = ", ".join(self.fit.robot_model.robot.joints[j] for j in log.missing)
+            raise IdentificationError(f"the torque of {names} was not logged")
+        if log.poses:
+            raise IdentificationError("poses at rest hold no motion")
         basis, estimate = self.fit.basis, self.fit.estimates[model].X.tolist()
         lost = {p for p in basis.parameters if p.name in written.lost}
         X = dict(zip(basis.parameters, estimate, strict=True))

@@ -10,7 +10,8 @@ import numpy as np
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.fit import Fit
 from idbench.experiments.identification.friction_choice import chosen_friction
-from idbench.experiments.identification.log_warnings import unusable, warnings_of_log
+from idbench.experiments.identification.log_warnings import unchanging, unusable, warnings_of_log
+from idbench.experiments.identification.logs import with_delay
 from idbench.experiments.identification.prior_share import chosen_share
 from idbench.experiments.identification.request import Request
 from idbench.experiments.identification.robot_model import RobotModel
@@ -23,13 +24,15 @@ from idbench.experiments.judgement.warnings import (
     MODEL,
     MOTION,
     hidden_notes,
+    undescribed,
     warnings_of_result,
-    warnings_of_robot,
     wrong_sign,
 )
 from idbench.experiments.text import error_percentage
 from idbench.identify import IdentificationError, RangeError, WeightedLeastSquares, estimate, validate
 from idbench.identify.judge.delay import estimate_delay
+from idbench.identify.judge.small_mistakes import WORTH as WORTH_A_WORD
+from idbench.identify.judge.stretches import held_out_errors
 from idbench.identify.telling import stage
 from idbench.sim.errors import BenchError
 
@@ -55,7 +58,8 @@ def delay_advice(result: Fit) -> Iterator[str]:
     """Yield the torque delay that the log itself shows, where it differs from the assumed one."""
     logs = result.logs.fitted
     assumed = logs[0].torque.delay
-    if wrong_sign(result) or result.robot_model.asked.prior:  # where a log needs a prior, its delay is not known without
+    # Where a log needs a prior, its delay is not known without.
+    if wrong_sign(result) or logs[0].poses or result.robot_model.asked.prior:
         return
     try:
         measured = estimate_delay(list(logs), result.basis, result.processing)
@@ -64,7 +68,12 @@ def delay_advice(result: Fit) -> Iterator[str]:
         return
     except IdentificationError:
         return
-    if abs(measured.delay - assumed) > max(SURE * measured.doubt, NEGLIGIBLE / logs[0].fs):
+    if abs(measured.delay - assumed) <= max(SURE * measured.doubt, NEGLIGIBLE / logs[0].fs):
+        return
+    # Inertia behind much friction looks like a delay: held-out stretches distinguish them, or nothing does.
+    delayed = result.problem.explicit.with_logs([with_delay(log, measured) for log in logs])
+    before, after = (np.log(held_out_errors(problem)) for problem in (result.problem.explicit, delayed))
+    if np.nansum(after) < np.nansum(before) and np.exp(np.nanmin(after - before)) < WORTH_A_WORD:
         yield (
             f"the log shows a torque delay of {1e3 * measured.delay:.3g} ms (sigma {1e3 * measured.doubt:.1g}), where "
             f"{1e3 * assumed:.3g} ms is assumed: --torque-delay estimate"
@@ -150,7 +159,7 @@ def checks(judgement: Judgement, *, delay: bool, trials: bool = True) -> dict[st
     """
     result = judgement.fit
     of_logs = list(warnings_of_logs(judgement))
-    found: dict[str, list[str]] = {LOG: of_logs, DELAY: [], FILE: warnings_of_robot(result.robot_model.robot)}
+    found: dict[str, list[str]] = {LOG: of_logs, DELAY: [], FILE: undescribed(result.robot_model.robot)}
     found |= {MOTION: [], MODEL: []}
     if any(map(unusable, result.logs.fitted)):  # all else may be its doing
         return found
@@ -172,4 +181,9 @@ def warnings_of_logs(judgement: Judgement) -> Iterator[str]:
     several = len(logs.fitted) > 1
     every = [(f"{logs.name(k)}: " if several else "", log) for k, log in enumerate(logs.fitted)]
     every += [(f"{name}: ", log) for name, log in (logs.held_out or {}).items()]
-    return (before + warning for before, log in every for warning in warnings_of_log(log, tree))
+    untested = judgement.fit.diagnosis is None
+    return (
+        before + warning
+        for before, log in every
+        for warning in (*warnings_of_log(log, tree), *(unchanging(log, tree) if untested else ()))
+    )

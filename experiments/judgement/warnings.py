@@ -8,8 +8,9 @@ from idbench.experiments.identification.fit import Fit
 from idbench.experiments.identification.log_warnings import resting, unlike_file, warnings_of_base
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.identify import MotionLog, brisk_shares, showing_moves
-from idbench.identify.basis.block import NOT_NEGATIVE
+from idbench.identify.basis.block import NOT_NEGATIVE, named
 from idbench.sim.robot.robot import Robot
+from idbench.sim.robot.time_steps import seeming_inertia
 from idbench.sim.robot.tree import kinematic_tree, unmodelled
 
 WELL_EXPLAINED = 0.95
@@ -31,6 +32,9 @@ FAR = 4.0
 WEAK = 0.5
 """Share of its value that the sigma of a parameter may have before it is marked as weak."""
 
+ALIKE = 0.1
+"""Share of what an integrator makes of damping by which rotors of a simulation differ from the file's beside that."""
+
 LINK_SIDE = 3.0
 """A rotor's inertia this many sigma below zero is impossible: the torques do not contain the rotor."""
 
@@ -48,25 +52,35 @@ MODEL = "the model"
 
 def warnings_of_result(fit: Fit) -> dict[str, list[str]]:
     """Return what no healthy identification shows, and what the log leaves open, by what it is about."""
-    log = [*wrong_sign(fit), *unlike_file(fit)]
+    log = [*wrong_sign(fit), *unlike_file(fit), *_seems_simulated(fit)]
     motion = list[str]()
     model = list[str]()
-    negative = {name: _negative(fit, name) for name in fit.estimates}
+    name = fit.leading
+    negative = _negative(fit, name)
     linked = list(_link_side(fit)) if not log else []
     model += linked
-    if any(negative.values()) and not log and not linked:
-        models: dict[tuple[str, ...], list[str]] = {}
-        for name, names in negative.items():
-            models.setdefault(tuple(names), []).append(name)
-        each = (f"{', '.join(names)} below zero in the {' and the '.join(of)} model" for names, of in models.items() if names)
-        model.append(f"{'; '.join(each)}: is the torque's meaning or delay wrong?")
-    for name in fit.estimates:
-        little = list(_too_little(fit, name))
-        motion += little
-        model += [] if little else list(_badly_explained(fit, name))
+    if negative and not log and not linked:
+        model.append(f"{', '.join(negative)} below zero in the {name} model: is the torque's meaning or delay wrong?")
+    little = list(_too_little(fit, name))
+    motion += little
+    model += [] if little else list(_badly_explained(fit, name))
     if not (log or motion or model):
         motion = _left_open(fit)
     return {LOG: log, MOTION: motion, MODEL: model}
+
+
+def _seems_simulated(fit: Fit) -> Iterator[str]:
+    """Yield whether rotors are larger than the file's by what MuJoCo's integrator makes of the file's own damping."""
+    robot, estimate = fit.robot_model.robot, fit.estimates[fit.leading]
+    inertia = seeming_inertia(robot)
+    found = dict(zip(estimate.names, estimate.X, strict=True))
+    own = [j for j in range(robot.n) if inertia[j] > 0 and named("Ia", j) in found]
+    more = [(found[named("Ia", j)] - robot.model.dof_armature[j]) / inertia[j] for j in own]
+    if len(own) > 1 and max(np.abs(np.array(more) - 1)) < ALIKE:
+        yield (
+            f"rotors are larger than the file's by {' '.join(f'{inertia[j]:.3g}' for j in own)} kg m^2, which the integrator "
+            "of a MuJoCo simulation of it makes of its damping: is this log of one? Then add --simulated"
+        )
 
 
 def _link_side(fit: Fit) -> Iterator[str]:
@@ -139,13 +153,14 @@ def _badly_explained(fit: Fit, name: str) -> Iterator[str]:
     """Yield which torques a model does not explain: the log is suspected, unless another model explains them."""
     joints = fit.robot_model.robot.joints
     shares = dict(enumerate(fit.explained[name]))
-    if nothing := [joints[j] for j, share in shares.items() if np.isnan(share)]:
+    still = set.intersection(*(set(log.unchanging) for log in fit.logs.fitted))
+    if nothing := [joints[j] for j, share in shares.items() if np.isnan(share) and j not in still]:
         yield (
-            f"no torque of {', '.join(nothing)} is left to explain: the mask leaves no row, or the torque never changes; "
-            "nothing is identified of it, move it faster"
+            f"no torque of {', '.join(nothing)} is left to explain, the mask leaves no row: nothing is identified of it, "
+            "move it faster"
         )
     poor = {j: share for j, share in shares.items() if share < WELL_EXPLAINED}
-    if not poor:
+    if not poor or fit.logs.fitted[0].poses:
         return
     poorly = ", ".join(f"{_share(share)} of tau{j + 1}" for j, share in poor.items())
     others = [o for o, shares in fit.explained.items() if all(shares[j] >= WELL_EXPLAINED for j in poor)]
@@ -171,10 +186,14 @@ def hidden_notes(fit: Fit) -> list[str]:
 
 
 def warnings_of_robot(robot: Robot) -> list[str]:
+    """Return what of a robot's file no parameter describes, and what was mended in it."""
+    return [*undescribed(robot), *(f"the file of robot {robot.name!r} has {note}" for note in robot.notes)]
+
+
+def undescribed(robot: Robot) -> list[str]:
     """Return what of a robot's file no parameter describes."""
     found = unmodelled(robot)
     messages = [f"the file of robot {robot.name!r} has {', '.join(found)}, which no parameter describes"] if found else []
-    messages += [f"the file of robot {robot.name!r} has {note}" for note in robot.notes]
     return [*messages, *warnings_of_base(kinematic_tree(robot))]
 
 

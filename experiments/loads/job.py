@@ -1,6 +1,8 @@
 """The jobs `payload` and `gains`: a request becomes logs with a payload and without it, and what follows from them."""
 
 import json
+import shlex
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -25,6 +27,11 @@ from idbench.identify.loads.loaded_robot import LETTERS, LoadedRobot
 from idbench.identify.loads.payload import WAYS, PayloadEstimate, with_known_robot
 from idbench.sim.robot.robot import Robot
 from idbench.sim.scenario.scenario_file import load as load_scenario
+
+GAIN_STEP = 1e-3
+"""Relative change of a gain by which derivatives are taken: small beside what changes weights, large beside rounding."""
+
+OF_GAINS = "sigma of the payload has no part of an error of the torque constants (--gain-sigma), which looks like mass"
 
 RUNS = 20
 """Simulated pairs of runs."""
@@ -97,10 +104,16 @@ def payload_of(asked: PayloadRequest) -> PayloadFit:
     """
     if asked.before is not None and asked.unloaded:
         raise ExperimentError("--before and --unloaded both say what the robot is: give one")
+    if asked.before is not None and asked.gain_sigma:
+        raise ExperimentError("--gain-sigma needs the logs without the payload: give --unloaded instead of --before")
     judgement, notes = _loaded(asked)
-    robot = judgement.robot
+    robot, n = judgement.robot, judgement.robot.tree.n
+    if len(asked.gain_sigma) not in (0, 1, n) or not all(0 <= x < 1 for x in asked.gain_sigma):
+        given = " ".join(f"{x:g}" for x in asked.gain_sigma)
+        raise ExperimentError(f"--gain-sigma {given}: give a share from 0 to 1, for all {n} joints or for each")
     if asked.before is None:
-        return PayloadFit(judgement, _by_ways(robot, asked), notes)
+        notes = (*notes, f"{OF_GAINS}; a payload of known mass shows them: {judgement.gains_command}")
+        return PayloadFit(judgement, _by_ways(judgement, asked), notes if not asked.gain_sigma else notes[:-1])
     names, X, C = _before(asked.before)
     if missing := [name for name in names if name not in robot.robot.names]:
         raise ExperimentError(
@@ -171,22 +184,47 @@ def _loaded(asked: LoadRequest) -> tuple[LoadJudgement, tuple[str, ...]]:
     robot_model = request.robot_model
     standard = robot_model.grouping.standard
     robot = LoadedRobot(robot_model.tree, standard, without, with_it, request.processing, request.solver, known)
-    return LoadJudgement(robot, request, loaded.names, np.array(loaded.read[-1].columns.gain or 1.0)), tuple(notes)
+    gain = np.array(loaded.read[-1].columns.gain or 1.0)
+    return LoadJudgement(robot, request, loaded.names, gain, _gains_command(asked)), tuple(notes)
 
 
-def _by_ways(robot: LoadedRobot, asked: PayloadRequest) -> dict[str, PayloadEstimate | str]:
+def _by_ways(judgement: LoadJudgement, asked: PayloadRequest) -> dict[str, PayloadEstimate | str]:
     """Return the payload by the ways that are asked for, or why one has none; raise if none has."""
+    robot, sigma = judgement.robot, np.broadcast_to(asked.gain_sigma or 0.0, judgement.robot.tree.n)
     if not robot.without:
         raise ExperimentError("give logs without the payload (--unloaded), or the robot as it was identified before (--before)")
     found = dict[str, PayloadEstimate | str]()
     for way in WAYS if asked.way == "all" else (asked.way,):
         try:
-            found[way] = WAYS[way](robot)
+            found[way] = _with_gains(WAYS[way], judgement, sigma)
         except IdentificationError as error:
             found[way] = str(error)
     if not any(isinstance(each, PayloadEstimate) for each in found.values()):
         raise ExperimentError(str(next(iter(found.values()))))
     return found
+
+
+def _with_gains(way: Callable[[LoadedRobot], PayloadEstimate], judgement: LoadJudgement, sigma: Array) -> PayloadEstimate:
+    """Return a payload whose covariance has what torque constants contribute: C + sum over joints sigma^2 dX/dg (dX/dg)'."""
+    found, C = way(judgement.robot), 0.0
+    for j in np.flatnonzero(sigma):
+        ratio = np.ones(len(sigma))
+        ratio[j] += GAIN_STEP
+        slope = (way(judgement.with_gains(ratio).robot).X - found.X) / GAIN_STEP
+        C = C + sigma[j] ** 2 * np.outer(slope, slope)
+    return replace(found, covariance=found.covariance + C)
+
+
+def _gains_command(asked: LoadRequest) -> str:
+    """Return the command that identifies the torque constants from the same logs."""
+    words = ["uv", "run", "idbench", "gains", *map(str, asked.log), "--unloaded", *map(str, asked.unloaded)]
+    words += ["--robot", str(asked.robot)]
+    for option, value in (("--torque", asked.torque), ("--torque-delay", asked.torque_delay)):
+        words += [option, value] if value else []
+    words += ["--resample"] if asked.reading.resample else []
+    stated = [f"{asked.known.mass:g}"] if asked.known.mass else ["KG"]
+    at = [f"{x:g}" for x in asked.known.at] if asked.known.at else ["X", "Y", "Z"]
+    return shlex.join([*words, "--mass", *stated, "--at", *at])
 
 
 def _before(path: Path) -> tuple[tuple[str, ...], Array, Array]:

@@ -8,14 +8,16 @@ from typing import Any, Self, final
 import numpy as np
 
 from idbench.experiments.errors import ExperimentError
-from idbench.experiments.identification.fit import fit
-from idbench.experiments.identification.log_warnings import unlike_file, warnings_of_log
+from idbench.experiments.identification.causes import Cause
+from idbench.experiments.identification.fitting import fit
+from idbench.experiments.identification.log_warnings import unchanging, unlike_file, warnings_of_log
 from idbench.experiments.identification.logs import Logs
 from idbench.experiments.identification.request import Request
 from idbench.experiments.judgement.held_out import GOOD, WORDS, Verdict
 from idbench.experiments.judgement.warnings import LOG, MODEL, wrong_sign
 from idbench.experiments.text import error_percentage
 from idbench.identify import Array, Estimate, ExplicitModel, IdentificationError, MotionLog, Problem, validate
+from idbench.identify.judge.diagnosis import diagnosed
 from idbench.identify.loads.drive_gains import read_with
 from idbench.identify.loads.loaded_robot import LETTERS, LoadedRobot, of_payload
 from idbench.identify.loads.payload import PayloadEstimate, with_robot_held
@@ -95,6 +97,8 @@ class LoadJudgement:
     """Names of the logs, those without the payload first."""
     gain: Array
     """Torque over what the files have: the logs have been read with it, shape (joint,)."""
+    gains_command: str = ""
+    """The command that identifies the torque constants from these logs, if the payload's mass is known."""
     before: Mapping[str, float] | None = None
     """Base parameters of the robot that were identified before, where there are no logs without the payload."""
 
@@ -111,12 +115,23 @@ class LoadJudgement:
         return self.robot.estimated(self.robot.of_both, self.robot.basis)
 
     @cached_property
+    def causes(self) -> tuple[Cause, ...]:
+        """Mistakes that all logs together show; none where the rows do not allow the tests."""
+        found, robot_model = self.estimate, self.request.robot_model
+        try:
+            suspects = diagnosed(found.problem, found.X)
+        except (IdentificationError, np.linalg.LinAlgError):
+            return ()
+        return tuple(Cause(each, robot_model, found.problem.logs[0], self.gain.tolist()) for each in suspects)
+
+    @cached_property
     def verdicts(self) -> dict[str, Verdict]:
         """How well the estimate of all logs predicts the torques of each."""
         found, joints = self.estimate, self.request.robot_model.robot.joints
         each = [Problem((log,), found.problem.basis, ExplicitModel(), self.robot.chain) for log in found.problem.logs]
         judged = [validate(problem, found.X, found.covariance) for problem in each]
-        return {name: Verdict(joints, validation) for name, validation in zip(self.names, judged, strict=True)}
+        of_logs = zip(self.names, judged, strict=True)
+        return {name: Verdict(joints, validation, causes=self.causes) for name, validation in of_logs}
 
     def word(self, doubts: Mapping[str, Sequence[str]]) -> str:
         """Return the verdict on the worst log; poor, if what was found cannot be, or contradicts what is stated."""
@@ -137,7 +152,8 @@ class LoadJudgement:
             yield from (f"{name}: {doubt}" for doubt in self._of_log(log))
 
     def _of_log(self, log: MotionLog) -> list[str]:
-        found = warnings_of_log(log, self.request.robot_model.tree)
+        tree = self.request.robot_model.tree
+        found = [*warnings_of_log(log, tree), *unchanging(log, tree)]
         try:
             alone = fit(replace(self.request, models=("explicit",)), Logs((log,)))
         except IdentificationError:  # too short for a fit of its own
@@ -145,7 +161,8 @@ class LoadJudgement:
         return [*found, *wrong_sign(alone), *unlike_file(alone)]
 
     def _of_fit(self) -> Iterator[str]:
-        """Yield which logs the estimate of all does not explain."""
+        """Yield mistakes that the logs show, and which of them the estimate of all does not explain."""
+        yield from (cause.advice for cause in self.causes)
         for name, verdict in self.verdicts.items():
             v = verdict.validation
             beyond = np.nan_to_num(v.percent_of_level(v.excess), posinf=np.inf)
@@ -172,7 +189,8 @@ class LoadJudgement:
             if off > max(SURE * sigma, SHARE * abs(x)):
                 yield (
                     f"{OPTIONS.get(name, '--inertia')}: {name} = {self.robot.known[name]:.4g} is stated, the logs show {x:.5g} "
-                    f"(sigma {sigma:.2g}), {off / sigma:.2g} sigma away: leave it out, or correct it"
+                    f"(sigma {sigma:.2g}), {off / sigma:.2g} sigma away: leave it out, or correct it; or are the torque "
+                    f"constants off? Then {self.gains_command}"
                 )
 
 

@@ -15,7 +15,8 @@ from rich.table import Table
 from rich.text import Text
 
 from idbench.experiments.errors import ExperimentError
-from idbench.experiments.identification.fit import Fit, fit
+from idbench.experiments.identification.fit import Fit
+from idbench.experiments.identification.fitting import fit
 from idbench.experiments.identification.logs import Logs
 from idbench.experiments.identification.request import Request
 from idbench.experiments.identification.robot_model import RobotModel

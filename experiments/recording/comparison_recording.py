@@ -10,7 +10,7 @@ import rerun as rr
 from rerun.chunk import Chunk, RrdReader
 
 from idbench.experiments.errors import ResultsError
-from idbench.experiments.identification.fit import fit
+from idbench.experiments.identification.fitting import fit
 from idbench.experiments.identification.logs import Logs
 from idbench.experiments.identification.request import Request
 from idbench.experiments.paper.table1 import Table1

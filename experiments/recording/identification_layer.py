@@ -62,6 +62,9 @@ def _send_band(stream: Stream, path: str, t: Array, values: Array, sigma: Array,
 EVERY = 0.5
 """Time between the instants of recursive estimates [s]."""
 
+WIDE = 7.0
+"""Width of what a mistake explains, on which the residual is drawn."""
+
 WIDEST = 0.5
 """A recursive estimate is shown once its sigma has been below this share of the last one, and in the second half anyway."""
 
@@ -108,6 +111,7 @@ class Layer:
             self._running(at, form, estimate, color)
             for fit in estimate.fits.values():
                 send_smoothed(self.stream, self._at, fit, self._joints)
+        self._mistake()
         self._truth()
         ResidualCharts(self.stream, self._at, self._fit, self._joints, self._shade).send()
         send_parameters(self.stream, self._at, self._fit, self._shade)
@@ -177,6 +181,17 @@ class Layer:
             self.stream.keep(path, rr.Measurements.from_fields(names=[form], colors=[color], widths=[2.0]))
             columns = rr.Measurements.columns(values=running.X[known, p], variances=variance)
             self.stream.send(path, [seconds(t[known])], columns)
+
+    def _mistake(self) -> None:
+        """Send what the first mistake that residuals show explains of them."""
+        first = next(iter(self._fit.diagnosis or ()), None)
+        if first is None or first.suspect.explained is None:
+            return
+        rows, form = self._fit.problem.explicit.rows, self._fit.leading
+        for kind, joint in enumerate(self._joints):
+            own = (rows.group == kind) & rows.valid
+            path, color = f"{self._at}/{form}/explained/{joint}", joint_colors(len(self._joints))[kind]
+            self.stream.curve(path, [seconds(rows.time[own])], first.suspect.explained[own], first.short, color, WIDE)
 
     def _truth(self) -> None:
         """Send the true parameters as lines from the beginning to the end."""

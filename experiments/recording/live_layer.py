@@ -2,12 +2,13 @@
 
 import sys
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 import rerun as rr
 
 from idbench.experiments.errors import reason, report
-from idbench.experiments.identification.fit import Fit, fit
+from idbench.experiments.identification.fitting import fit
 from idbench.experiments.identification.logs import Logs
 from idbench.experiments.identification.request import Request
 from idbench.experiments.identification.robot_model import RobotModel
@@ -17,6 +18,9 @@ from idbench.experiments.recording.stream import Stream
 from idbench.experiments.text import FORM_WIDTHS, FORMS, GREY
 from idbench.identify import Array, Estimate, IdentificationError, MotionLog, TorqueChannel
 from idbench.identify.rows.rows import is_long
+
+if TYPE_CHECKING:
+    from idbench.experiments.identification.fit import Fit
 
 GROWTH = 1.1
 """How much longer the log must be before it is identified again: so often that the work stays in proportion to the log."""

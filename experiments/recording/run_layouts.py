@@ -208,7 +208,13 @@ def _fits(shelf: Shelf, rows: Sequence[str]) -> Iterator[Part]:
 def residuals(shelf: Shelf) -> list[Part]:
     """Return the residuals of the models, a plot for each kind of row."""
     return [
-        plot(shelf, f"residual {row} [{_unit(row)}]", *_of_models(shelf, "residual", row), legend=_many(shelf))
+        plot(
+            shelf,
+            f"residual {row} [{_unit(row)}]",
+            *_of_models(shelf, "residual", row),
+            *_of_models(shelf, "explained", row),
+            legend=_many(shelf),
+        )
         for row in _rows(shelf)
     ]
 

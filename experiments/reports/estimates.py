@@ -192,4 +192,6 @@ def _next(judgement: Judgement, first: str) -> str:
         return f"next: check {first}"
     if judgement.good:
         return "next: --write arm.urdf arm.json arm.py keeps the robot"
+    if judgement.fit.logs.fitted[0].poses:
+        return "next: more poses"
     return "next: a longer or more exciting motion (idbench excite), or another law of friction (--friction auto)"

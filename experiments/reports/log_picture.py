@@ -1,13 +1,13 @@
 """A log as a picture: its motion, torques, spectra and clock."""
 
 import numpy as np
-import scipy
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from idbench.experiments.identification.logs import LogFacts
 from idbench.experiments.text import JOINTS
 from idbench.identify import Array
+from idbench.identify.signals.spectra import welch
 
 POINTS = 4000
 """Largest number of points of a curve: more are invisible."""
@@ -28,9 +28,9 @@ def figure_of(facts: LogFacts) -> Figure:
     handles, labels = panels[-1].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=8, frameon=False)
     spectra, clock = figure.add_subplot(grid[3, 0]), figure.add_subplot(grid[3, 1])
-    f, power = scipy.signal.welch(log.tau, log.fs, nperseg=min(log.samples, round(4 * log.fs)), axis=0)
+    f, power = welch(log.tau.T, log.fs, min(log.samples, round(4 * log.fs)))
     for j in range(log.n):
-        spectra.loglog(f[1:], np.sqrt(power[1:, j]), color=_color(j), lw=0.8)
+        spectra.loglog(f[1:], np.sqrt(power[j, 1:]), color=_color(j), lw=0.8)
     spectra.set_xlabel("frequency [Hz]")
     spectra.set_ylabel("torque [N m/$\\sqrt{Hz}$]")
     _clock(clock, facts)

@@ -9,6 +9,7 @@ from idbench.experiments.judgement.held_out import HeldOut
 from idbench.experiments.judgement.judgement import Judgement, Unjudged
 from idbench.experiments.reports.estimates import EstimatesTable
 from idbench.experiments.reports.figures import (
+    causes_figure,
     friction_figure,
     parameters_figure,
     rendered,
@@ -42,6 +43,7 @@ def report(
         unjudged="; ".join(one.why for one in judgement.on if isinstance(one, Unjudged)),
         failures=fit.failures,
         warnings={about: messages for about, messages in warnings.items() if messages},
+        causes=_figure(attempts, "causes", causes_figure, fit),
         unseen=[_held_out(one, attempts) for one in judgement.held_out],
         parameters=_figure(attempts, "parameters", parameters_figure, fit),
         parameter_heads=[" ".join(head) for head in table.heads],

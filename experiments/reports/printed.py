@@ -79,12 +79,14 @@ def _told(fit: Fit) -> Iterator[str]:
     channel = fit.logs.fitted[0].torque
     ignored = f", which chain {fit.request.chain} ignores: it takes it as logged"
     logged = isinstance(fit.processing.alignment, AsLogged)
-    yield str(fit.rates)
+    if fit.rates:
+        yield str(fit.rates)
     asked = fit.robot_model.asked
     if asked.hold or asked.tie:
         known = (("held", asked.hold), ("tied", asked.tie))
         yield "; ".join(f"{what}: {', '.join(words)}" for what, words in known if words)
-    yield f"torque: {channel.meaning}, delay {channel.late}{ignored if logged else ''}"
+    if not fit.logs.fitted[0].poses:
+        yield f"torque: {channel.meaning}, delay {channel.late}{ignored if logged else ''}"
     if channel.delay_sigma:
         without = [name for name, estimate in fit.estimates.items() if not estimate.knows_delay]
         but = f", but for {', '.join(without)}" if without else ""
@@ -128,6 +130,8 @@ def _print_logs(console: Console, fit: Fit) -> None:
 
 def _rotors(fit: Fit) -> Iterator[str]:
     """Yield why no joint has the inertia of a rotor, if none has."""
+    if fit.logs.fitted[0].poses:
+        return
     asked, filed = fit.robot_model.asked.armature, bool(fit.robot_model.robot.model.dof_armature.any())
     if asked == "none":
         words = "no armature is identified and reversals are not masked, as where torques are measured at the links"
@@ -177,7 +181,9 @@ def print_held_out(console: Console, one: HeldOut | Unjudged, whole: Sequence[st
         noise = percentage(first.percent_of_level(first.noise)[j])
         cells = (cell for model in torques for cell in _held_out_cells(one, model, j)[: 3 + simulated])
         grid.add_row(joint, noise, *cells)
-    what = "torque error while moving [N m, N]" + (", position error of the simulated robot [rad, m]" if simulated else "")
+    what = f"torque error{'' if one.log.poses else ' while moving'} [N m, N]" + (
+        ", position error of the simulated robot [rad, m]" if simulated else ""
+    )
     print_titled(console, f"{one.title}: {what}", grid, 2)
     if (within := one.within_interval(best)) is not None and one.fit.torque_intervals[best] is not None:
         console.print(Text(_interval_words(one, best, *within)), soft_wrap=True)
@@ -200,7 +206,7 @@ def _interval_words(one: HeldOut, model: str, inside: Array, outside: float) -> 
     """Return how many of a held-out log's torques lie in the fit's intervals, and how much of its motion outside of the fit."""
     interval, joints = one.fit.torque_intervals[model], one.fit.robot_model.robot.joints
     assert interval is not None
-    half = " ".join(f"{x:.2g}" for x in interval.half)
+    half = " ".join(f"{x:.2g}" if isfinite(x) else "-" for x in interval.half)
     unit = ", ".join(dict.fromkeys(one.fit.robot_model.units(j)[0] for j in range(len(joints))))
     share = np.nan_to_num(inside, nan=1.0)
     worst = f", of {joints[int(share.argmin())]} {100 * share.min():.0f} %" if len(joints) > 1 else ""
@@ -225,5 +231,7 @@ def _alike(verdicts: Mapping[str, tuple[str, ...]]) -> dict[tuple[str, ...], lis
 
 def _held_out_cells(one: HeldOut, model: str, j: int) -> tuple[str, str, str, str]:
     validation, off = one.torques[model], one.position_error(model)
+    if not isfinite(validation.rms[j]):
+        return "", "", "", ""
     R2 = f"{validation.R2[j]:.5f}" if validation.R2[j] > -WORTHLESS else f"<-{WORTHLESS:g}"
     return f"{validation.rms[j]:.2g}", percentage(validation.percent[j]), R2, "" if off is None else f"{off[j]:.1e}"

@@ -98,6 +98,9 @@ class PayloadRequest(LoadRequest):
     way: Way = "together"
     """together: all logs in one fit (best); fixed: first the robot, then the payload; apart: two fits, subtracted; difference:
     of the torques of one repeated motion; all: compare them."""
+    gain_sigma: Each = ()
+    """Standard deviation of the torque constants, as a share of them (0.01 is 1 %), of all joints or of each: it becomes part
+    of that of the payload, in which a wrong torque constant looks like mass."""
 
 
 @dataclass(frozen=True)
@@ -107,26 +110,33 @@ class GainsRequest(LoadRequest):
 
 @dataclass(frozen=True)
 class ServoRequest:
-    """Identify position-controlled joints from commands and positions alone."""
+    """Identify joints under position loops (servos, legs, MuJoCo's actuators) from commands and positions alone."""
 
     log: Logs = ()
     """Logs of commands and positions: columns t, q1, ..., command1, ... in SI units; on1, ..., voltage1, ... if logged."""
     robot: Robot = None
     """Name of a shipped robot, or its file: MJCF or URDF. Its links, a known mass included, set the scale of all torques."""
     servo: File = None
-    """servo.toml: model = "STS3215" or gain = 0.166, then kp, supply, duty_limit, counts; [joints.NAME] and [logs."FILE"] for
-    what differs."""
+    """servo.toml: model = "STS3215", kp, supply; or kind = "torque", kp, kd, torque_limit; [joints.NAME] and [logs."FILE"] for
+    what differs. By default what the actuators of the robot's file state."""
+    simulated: bool = False
+    """Logs are of a MuJoCo simulation of the file: its integrator is taken into account."""
     friction: Annotated[str, Word("LAW")] = "load"
     """Friction law: coulomb, stribeck, load, load-stribeck, directional, quadratic, gear; auto compares them, and takes the
     simplest that no other predicts significantly better."""
     find: Letters = ()
-    """Further parameters to be found: lead, dead_band, backlash, Mg, Fo."""
+    """Further parameters to be found: lag, lead, dead_band, backlash, gain_error, scale_error, zero, bias, Mg, Fo; a of a loop
+    that commands torques."""
     hold: Texts = ()
     """Known parameters, of all joints or of one: Ia=0.02 wrist_roll.a=0.5 (N m/V)."""
+    tie: Annotated[tuple[str, ...], Word("JOINT,JOINT")] = ()
+    """Joints with the same motor, one word a motor: '*_hip' 'knee_left,knee_right'."""
     columns: Texts = ()
     """Names of columns: q=position_* command=goal_* on=torque_enable (* stands for numbers or names of joints)."""
     units: Texts = ()
     """Units: t=ms q=deg command=deg."""
+    rows: Texts = ()
+    """Use only rows in which columns have these values: episode_index=3."""
     mounting: MountingOptions = MountingOptions()  # noqa: RUF009  # frozen
     """How the robot is mounted."""
     validate: Files = ()

@@ -60,6 +60,12 @@ class ColumnOptions:
     resample: bool = False
     """Make times uniform: remove repeated rows, use a steady clock where stamps jitter, interpolate missing samples, split at
     gaps, use logged velocities where they are more accurate. Every step is reported."""
+    simulated: bool = False
+    """The log is of MuJoCo's simulation of the robot's file by the file's own actuators, joint torques (qfrc_actuator) logged
+    before each step: what the integrator makes of damping is taken out. Default: where that is evident from the file."""
+    poses: bool = False
+    """Each row is a pose at rest, by itself: gravity alone is identified, by chain poses. Default: rows that are 0.5 s apart
+    and do not continue each other are poses."""
 
     @property
     def stated(self) -> bool:

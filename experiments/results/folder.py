@@ -32,7 +32,7 @@ FILES: Mapping[str, tuple[str, ...]] = {
     "payload": ("summary.json", "fault.txt"),
     "gains": ("summary.json", "fault.txt"),
     "benchmark": ("summary.json", "report.html", "fault.txt"),
-    "benchmark-set": ("summary.json", "fit*.npz", "held_out*.npz", "robot.urdf", "fault.txt"),
+    "benchmark-set": ("summary.json", "fit*.npz", "held_out*.npz", "robot.urdf", "fault.txt", "identified.*", "SOURCE.md"),
     "servo": ("summary.json", RECORDING, "fault.txt"),
     "study": ("summary.json", "report.html", "recording.rrd", "fault.txt"),
 }

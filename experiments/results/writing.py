@@ -55,6 +55,17 @@ Read = Sequence[Path]
 """Files that a command reads: they are never replaced, not even with --force."""
 
 
+def require_free_folder(path: Path, option: str, *, force: bool = False) -> None:
+    """Raise ResultsError if a folder of new files cannot be made there, or holds files that may not be replaced."""
+    if path.is_dir():
+        if any(path.iterdir()) and not force:
+            raise _taken(path, option)
+    elif path.exists():
+        raise ResultsError(f"{option} {path} is a file, not a folder: choose another name")
+    else:
+        _require_place(path, option, ())
+
+
 def require_free(path: Path, option: str, *, force: bool = False, read: Read = ()) -> None:
     """Raise ResultsError if a file cannot be written to `path`, before the work that it takes; `option` names it.
 

@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
 from functools import cached_property
 from pathlib import Path
 from typing import Any, final
@@ -11,21 +12,24 @@ import numpy as np
 import tomli_w
 
 from idbench.experiments.errors import ExperimentError
+from idbench.experiments.identification.log_warnings import warnings_of_log
 from idbench.experiments.servo.joints import Identified, Joints, JointsLog
-from idbench.identify import Array
-from idbench.identify.files.servo_log import ServoColumns, ServoFile
+from idbench.identify import Array, MotionLog, TorqueChannel
+from idbench.identify.files.servo_file import ServoFile
+from idbench.identify.files.servo_log import ServoColumns
 from idbench.identify.servo import Servo, ServoFit, ServoRun, identify_servo
 from idbench.identify.servo.choice import choose_friction, lacks_of
+from idbench.identify.servo.fit import TORQUES
+from idbench.identify.servo.law import EXACT, KINDS
+from idbench.identify.servo.mistakes import MISTAKES, ServoMistake
 from idbench.identify.servo.parameters import SERVO_PARAMETERS
 from idbench.sim.drives import ServoDrive
 from idbench.sim.engine.run import Run
 from idbench.sim.robot.mounting import Mounting
 from idbench.sim.robot.robot import Robot
 from idbench.sim.robot.servos import links
+from idbench.sim.robot.tree import kinematic_tree
 from idbench.sim.settings import per_joint
-
-EXACT = 2**24
-"""Counts a turn that stand for a firmware without rounding."""
 
 
 def known_servos(drive: ServoDrive, n: int) -> list[Servo]:
@@ -38,7 +42,9 @@ def servo_toml(drive: ServoDrive, robot: Robot) -> str:
     """Return what is known of the servos of a robot as servo.toml."""
     first, *others = known_servos(drive, robot.n)
     differing = {joint: {"kp": servo.kp} for joint, servo in zip(robot.joints[1:], others, strict=True) if servo.kp != first.kp}
-    return tomli_w.dumps({**vars(first), **({"joints": differing} if differing else {})})
+    names = {"limit": KINDS[first.kind].limit}
+    stated = {names.get(name, name): x for name, x in vars(first).items() if x != getattr(Servo, name) or name == "kp"}
+    return tomli_w.dumps(stated | ({"joints": differing} if differing else {}))
 
 
 def write_commands(run: Run, robot: Robot, path: Path) -> None:
@@ -64,6 +70,8 @@ class Servos:
     """What is known of the servos."""
     logs: dict[Path, ServoColumns]
     """What was logged."""
+    notes: tuple[str, ...] = ()
+    """What was read and assumed."""
 
     @cached_property
     def links(self) -> Robot:
@@ -102,28 +110,41 @@ class Servos:
         names = self.links.joints
         logs = [
             JointsLog(
-                self.name(path), columns, tuple(self.known.servo(joint, path.name).kp for joint in names), self.links_of(path)
+                self.name(path), columns, tuple(self.known.servo(joint, path.name) for joint in names), self.links_of(path)
             )
             for path, columns in self.logs.items()
         ]
-        return Joints(self.links, tuple(self.known.servo(joint, "") for joint in names), tuple(logs))
+        return Joints(self.links, tuple(logs))
 
     def name(self, path: Path) -> str:
         """Return what messages call a log: its file, with the folder where several files have the same name."""
         return path.name if Counter(other.name for other in self.logs)[path.name] == 1 else str(path)
 
     def identified(
-        self, friction: str, find: Sequence[str], held: Mapping[str, dict[str, float]]
+        self, friction: str, find: Sequence[str], held: Mapping[str, dict[str, float]], ties: Sequence[str] = ()
     ) -> Iterator[tuple[str, Identified | str]]:
         """Yield the fit of each joint, all laws of friction compared (`auto`), or why there is none; of an arm twice."""
         names = self.links.joints
 
-        def identify(j: int, servo: Servo, runs: Sequence[ServoRun]) -> Identified:
+        def identify(j: int, runs: Sequence[ServoRun]) -> Identified:
             if friction == AUTO:
-                return choose_friction(servo, runs, find, held[names[j]])
-            return identify_servo(servo, runs, friction, find, held[names[j]])
+                return choose_friction(runs, find, held[names[j]])
+            return identify_servo(runs, friction, find, held[names[j]])
 
-        yield from ((names[j], result) for j, result in self.joints.identified(identify))
+        yield from ((names[j], result) for j, result in self.joints.identified(identify, self.motors(ties)))
+
+    def motors(self, ties: Sequence[str]) -> list[list[int]]:
+        """Return the joints of each motor, by patterns of their names, several with commas."""
+        names, found = self.links.joints, list[list[int]]()
+        for tie in ties:
+            own = [[j for j, name in enumerate(names) if fnmatchcase(name, pattern)] for pattern in tie.split(",")]
+            motor = sorted({j for some in own for j in some})
+            if not all(own) or len(motor) < 2:
+                raise ExperimentError(f"--tie {tie}: name two joints or more, of {', '.join(names)}; * stands for any letters")
+            if twice := [names[j] for j in motor if any(j in other for other in found)]:
+                raise ExperimentError(f"--tie {tie}: {twice[0]} is tied already")
+            found.append(motor)
+        return found
 
     def runs_with(self, fits: Mapping[str, ServoFit]) -> dict[str, list[ServoRun]]:
         """Return runs of the joints that have a fit, while the others move as their fits say."""
@@ -140,6 +161,22 @@ class Servos:
         runs = self.runs_with(fits)
         return {joint: fit.errors(runs[joint]) for joint, fit in fits.items()}
 
+    @property
+    def doubts(self) -> list[str]:
+        """What is suspicious about the positions: jumps, degrees, places that a joint cannot reach."""
+        tree, found = kinematic_tree(self.links), list[str]()
+        for path, columns in self.logs.items():
+            fs = 1 / float(np.median(np.diff(columns.t)))
+            log = MotionLog(fs, columns.q, np.zeros_like(columns.q), TorqueChannel("instantaneous"))
+            found += [f"{self.name(path)}: {doubt}" for doubt in warnings_of_log(log, tree)]
+        return found
+
+    @property
+    def moved(self) -> dict[str, float]:
+        """Rms of the motion of each joint about its mean, of all logs [rad]."""
+        squares = np.mean([np.var(columns.q, axis=0) for columns in self.logs.values()], axis=0)
+        return dict(zip(self.links.joints, map(float, np.sqrt(squares)), strict=True))
+
     def place(self, joint: str) -> int:
         """Return the number of a joint."""
         return self.links.joints.index(joint)
@@ -153,8 +190,41 @@ def summary_of(fit: ServoFit) -> dict[str, Any]:
     """Return what a summary says of a fit."""
     sigma, bound = fit.standard_errors, fit.bound
     return {
-        name: {"value": x, "sigma": sigma.get(name), "bound": bound.get(name), "unit": SERVO_PARAMETERS[name].unit}
+        name: {"value": x, "sigma": sigma.get(name), "bound": bound.get(name), "unit": unit_of(fit.servo, name)}
+        | ({"factor": list(fit.factor)} if name in TORQUES and not fit.scaled and name not in fit.known else {})
         for name, x in fit.p.items()
+    } | gains_of(fit)
+
+
+def gains_of(fit: ServoFit) -> dict[str, Any]:
+    """Return the gains of a loop that commands torques, kp and kd at the joint, with the standard error of their factor a."""
+    servo, sigma = fit.servo, fit.standard_errors.get("a")
+    if servo.kind == Servo.kind:
+        return {}
+    stated = {"kp": (servo.slope, "N m/rad"), "kd": (servo.kd + servo.slope * fit.p.get("lead", 0.0), "N m s/rad")}
+    return {
+        name: {"value": fit.p["a"] * x, "sigma": None if sigma is None else abs(x) * sigma, "bound": None, "unit": unit}
+        for name, (x, unit) in stated.items()
+    }
+
+
+def unit_of(servo: Servo, name: str) -> str:
+    """Return the unit of a parameter; that of a is what its loop commands."""
+    return KINDS[servo.kind].unit if name == "a" else SERVO_PARAMETERS[name].unit
+
+
+def mistake_summary(joint: str, mistake: ServoMistake) -> dict[str, Any]:
+    """Return what a summary says of what is wrong with a joint."""
+    return {
+        "cause": MISTAKES[mistake.letter],
+        "joint": joint,
+        "size": mistake.size,
+        "sigma": mistake.sigma,
+        "unit": SERVO_PARAMETERS[mistake.letter].unit,
+        "p": mistake.p,
+        "alternatives": [[MISTAKES[name], joint] for name in mistake.alternatives],
+        "remedy": f"--find {mistake.letter}",
+        "held_out": list(mistake.errors),
     }
 
 

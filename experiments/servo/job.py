@@ -1,24 +1,32 @@
 """The job `servo`: a request becomes servos with their logs, what is known of them, and fits joint by joint."""
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, final
 
+import numpy as np
+
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.robot_model import absolute
 from idbench.experiments.requests.jobs import ServoRequest
-from idbench.experiments.servo.identification import AUTO, Servos, lacks_summary, summary_of
+from idbench.experiments.servo.identification import AUTO, Servos, lacks_summary, mistake_summary, summary_of
 from idbench.experiments.servo.joints import Identified
 from idbench.experiments.servo.servo_text import verdicts
-from idbench.identify import Array, SettingError
-from idbench.identify.files.servo_log import ServoColumns, ServoFile, order, read_servo_log
+from idbench.identify import Array, IdentificationError, SettingError
+from idbench.identify.files.servo_file import ServoFile
+from idbench.identify.files.servo_log import ServoColumns, ordered, read_servo_log
 from idbench.identify.servo import SERVO_FRICTIONS, ServoFit
 from idbench.identify.servo.choice import ServoFrictionChoice
 from idbench.identify.servo.fit import require_possible
+from idbench.identify.servo.law import EXACT, TimeSteps
+from idbench.identify.servo.mistakes import ServoMistake, mistake_of
 from idbench.identify.servo.parameters import SERVO_PARAMETERS
+from idbench.identify.telling import stage
+from idbench.sim.robot.position_loops import PositionLoop, position_loops
 from idbench.sim.robot.robot import Robot
+from idbench.sim.robot.time_steps import steps_of
 
 
 @final
@@ -34,6 +42,8 @@ class ServosFit:
     """The fit of each joint, or why it has none."""
     choices: Mapping[str, ServoFrictionChoice]
     """The laws of friction that were compared, of joints that have a fit."""
+    mistakes: Mapping[str, ServoMistake] = field(default_factory=dict)
+    """What is wrong with joints, and was proved."""
 
     @property
     def fits(self) -> dict[str, ServoFit]:
@@ -49,7 +59,8 @@ class ServosFit:
     @property
     def verdicts(self) -> list[str]:
         """What the errors mean."""
-        return verdicts(self.fits, self.errors["fitted"], self.errors.get("held out", {}))
+        moved = self.others.moved if self.others else {}
+        return verdicts(self.fits, self.errors["fitted"], self.errors.get("held out", {}), moved, self.mistakes)
 
     def parameters(self) -> dict[str, Any]:
         """Return what a summary.json says of the fits."""
@@ -58,6 +69,7 @@ class ServosFit:
             **({"laws": laws} if laws else {}),
             "joints": {joint: summary_of(fit) for joint, fit in self.fits.items()},
             "lack_of_fit": {joint: lacks_summary(fit) for joint, fit in self.fits.items()},
+            "diagnosis": [mistake_summary(joint, mistake) for joint, mistake in self.mistakes.items()],
         }
 
     def summary(self) -> dict[str, Any]:
@@ -80,7 +92,9 @@ def servos_identified(asked: ServoRequest, heard: Heard | None = None) -> Servos
     """
     servos, others = servos_of(asked)
     every, choices = dict[str, ServoFit | str](), dict[str, ServoFrictionChoice]()
-    for joint, result in servos.identified(asked.friction, asked.find, held_of(asked, servos.links.joints)):
+    held = held_of(asked, servos.links.joints)
+    servos.motors(asked.tie)  # what is wrong with it is said before the work
+    for joint, result in servos.identified(asked.friction, asked.find, held, asked.tie):
         if isinstance(result, ServoFrictionChoice):
             choices[joint] = result
         elif isinstance(result, str):
@@ -91,28 +105,63 @@ def servos_identified(asked: ServoRequest, heard: Heard | None = None) -> Servos
     made = ServosFit(servos, others, every, choices)
     if not made.fits:
         raise ExperimentError("; ".join(dict.fromkeys(str(why) for why in every.values())))
-    return made
+    with stage("what is wrong"):
+        tested = {joint: _tested(fit) for joint, fit in made.fits.items()}
+    return replace(made, mistakes={joint: found for joint, found in tested.items() if found})
+
+
+def _tested(fit: ServoFit) -> ServoMistake | None:
+    """Return what is wrong with a fit; nothing if the tests fail: an estimate is not lost with them."""
+    try:
+        return mistake_of(fit)
+    except (IdentificationError, np.linalg.LinAlgError):
+        return None
 
 
 def servos_of(asked: ServoRequest) -> tuple[Servos, Servos | None]:
     """Return the servos with the logs of the fit, and with those that it does not see."""
-    for name, given in (("--robot", asked.robot), ("--servo", asked.servo)):
-        if given is None:
-            raise ExperimentError(f"{name} is missing; see idbench servo --help")
+    if asked.robot is None:
+        raise ExperimentError("--robot is missing; see idbench servo --help")
     if not asked.log:
         raise ExperimentError("name the logs of commands and positions")
     if asked.friction not in (*SERVO_FRICTIONS, AUTO):
         raise ExperimentError(f"--friction {asked.friction} is unknown; known: {', '.join(SERVO_FRICTIONS)}, {AUTO}")
-    assert asked.robot is not None
-    assert asked.servo is not None
-    known, mounting = ServoFile.read(asked.servo), asked.mounting.mounting
+    mounting = asked.mounting.mounting
+    robot = Robot.load(absolute(asked.robot), mounting.edit)
+    known, loops = _known(asked, robot)
     logs, held = asked.log, asked.validate
     if not held and len(logs) > 1:
         logs, held = logs[:-1], logs[-1:]
-    servos = Servos(absolute(asked.robot), mounting, known, {})
-    made = servos.of_logs({path: _ordered(path, asked, servos.links.joints) for path in logs})
-    others = {path: _ordered(path, asked, servos.links.joints) for path in held}
-    return made, servos.of_logs(others) if others else None
+    notes = [*(f"the robot's file has {note}" for note in robot.notes), *_said(loops, known)]
+    known.require(robot.joints, [path.name for path in (*logs, *held)])
+    read = {path: _read(path, asked, robot.joints, loops) for path in (*logs, *held)}
+    notes += [said for _, said in read.values() if said]
+    servos = Servos(absolute(asked.robot), mounting, known, {}, tuple(notes))
+    made, others = (servos.of_logs({path: read[path][0] for path in of}) for of in (logs, held))
+    return made, others if held else None
+
+
+def _known(asked: ServoRequest, robot: Robot) -> tuple[ServoFile, dict[str, PositionLoop]]:
+    """Return what is known of the servos, by --servo or by the actuators of the robot's file, and these."""
+    steps = {joint: TimeSteps(*x) for joint, x in steps_of(robot).items()} if asked.simulated else {}
+    if asked.servo is not None:
+        return replace(ServoFile.read(asked.servo), steps=steps), {}
+    loops = position_loops(robot)
+    if lacking := [joint for joint in robot.joints if joint not in loops]:
+        raise ExperimentError(
+            f"--servo is missing: {asked.robot} has no actuator that controls the position of {', '.join(lacking)}; state the "
+            'loop, such as kind = "torque", kp = 25, kd = 0.6, or model = "STS3215"; --lock NAME=VALUE holds a joint'
+        )
+    return ServoFile({"counts": EXACT}, {joint: dict(loop.stated) for joint, loop in loops.items()}, {}, steps), loops
+
+
+def _said(loops: Mapping[str, PositionLoop], known: ServoFile) -> Iterator[str]:
+    """Yield what the actuators of the robot's file state, which was taken."""
+    if loops:
+        each = ", ".join(f"{joint} {loop.stated['kp']:.4g} {loop.stated['kd']:.4g}" for joint, loop in loops.items())
+        yield f"kp and kd of its actuators: {each}"
+        if not known.steps:
+            yield "nothing is said of time steps: for a log of a MuJoCo simulation add --simulated"
 
 
 def held_of(asked: ServoRequest, joints: Sequence[str]) -> dict[str, dict[str, float]]:
@@ -143,11 +192,21 @@ def files_of(asked: ServoRequest) -> tuple[Path, ...]:
     return (*robot, *([asked.servo] if asked.servo else []), *asked.log, *asked.validate)
 
 
-def _ordered(path: Path, asked: ServoRequest, joints: Sequence[str]) -> ServoColumns:
-    columns = read_servo_log(path, _stated("--columns", asked.columns), _stated("--units", asked.units))
-    place = order(columns, joints, path)
-    on, voltage = (None if x is None else x[:, place] for x in (columns.on, columns.voltage))
-    return ServoColumns(columns.t, columns.q[:, place], columns.command[:, place], on, voltage, tuple(joints))
+def _read(
+    path: Path, asked: ServoRequest, joints: Sequence[str], loops: Mapping[str, PositionLoop]
+) -> tuple[ServoColumns, str]:
+    """Return a log in the order of the joints, commands as angles, and what was assumed of it."""
+    try:
+        rows = {name: float(value) for name, value in _stated("--rows", asked.rows).items()}
+    except ValueError:
+        raise ExperimentError(f"--rows {' '.join(asked.rows)}: give columns and numbers, such as episode_index=3") from None
+    columns, said = read_servo_log(path, _stated("--columns", asked.columns), _stated("--units", asked.units), rows)
+    columns = ordered(columns, joints, {loop.actuator: joint for joint, loop in loops.items()}, path)
+    if loops:
+        both = [loops[joint].commanded(u) for joint, u in zip(joints, columns.command.T, strict=True)]
+        angle, torque = (np.stack(x, axis=1) for x in zip(*both, strict=True))
+        columns = replace(columns, command=angle, forward=torque if torque.any() else columns.forward)
+    return columns, said
 
 
 def _stated(option: str, texts: Sequence[str]) -> dict[str, str]:

@@ -1,92 +1,62 @@
 """Servos as text."""
 
-import ast
-import inspect
-import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from importlib.metadata import version
-from importlib.resources import files
-from pathlib import Path
-from pprint import pformat
-from textwrap import dedent, indent
-from typing import Any
+from collections.abc import Collection, Iterable, Iterator, Mapping
 
 import numpy as np
 from rich.text import Text
 
-from idbench.experiments.errors import ExperimentError
+from idbench.experiments.judgement.held_out import FAIR, GOOD
 from idbench.experiments.results.page import Page
-from idbench.experiments.servo.identification import Servos
-from idbench.experiments.text import new_table, number, print_titled
+from idbench.experiments.servo.identification import unit_of
+from idbench.experiments.text import error_percentage, new_table, number, print_titled
 from idbench.identify import Array
-from idbench.identify.servo import Servo, ServoFit
+from idbench.identify.arrays import TINY
+from idbench.identify.servo import ServoFit
 from idbench.identify.servo.choice import ServoFrictionChoice, lacks_of
+from idbench.identify.servo.fit import TORQUES
+from idbench.identify.servo.mistakes import EXPLAINED, REMAINING, ServoMistake
 from idbench.identify.servo.parameters import SERVO_PARAMETERS
-from idbench.sim.robot.servos import Commands, ServoValues, replay, with_servos
-
-NONE = {"rate": float("inf"), "vs": 1.0}
-"""What parameters are that a servo does not have; others are 0."""
-
-
-def servo_function(robot: str, fits: Mapping[str, tuple[Servo, ServoFit]], logs: Sequence[str]) -> str:
-    """Return the file: what is known of each joint's servo, and what was found."""
-    text = files("idbench.experiments.exports").joinpath("servo.py.txt").read_text(encoding="utf-8")
-    every = {joint: _parameters(servo, fit) for joint, (servo, fit) in fits.items()}
-    table = pformat(every, width=110, sort_dicts=False).replace("inf", 'float("inf")')
-    words = {
-        "{friction}": _friction_lines(),
-        "{name}": robot,
-        "{version}": version("idbench"),
-        "{logs}": ", ".join(logs),
-        "{servos}": table,
-    }
-    for mark, word in words.items():
-        text = text.replace(mark, word)
-    return text
-
-
-def _friction_lines() -> str:
-    """Return the lines of the compiled friction as plain Python, the parameters `p` a table."""
-    from idbench.identify.servo.servo_step import friction
-
-    lines: Any = ast.parse(dedent(inspect.getsource(friction.py_func))).body[0]
-    code = re.sub(r"\bp\.(\w+)", r'p["\1"]', "\n".join(ast.unparse(line) for line in lines.body[1:]))
-    return indent(code.replace("return ", 'return p["Fo"] * (not on) + '), 8 * " ")
-
-
-def _parameters(servo: Servo, fit: ServoFit) -> dict[str, float]:
-    known = {"gain": servo.gain * servo.kp, "supply": servo.supply, "duty_limit": servo.duty_limit, "counts": servo.counts}
-    return {**known, **{name: float(fit.p.get(name, NONE.get(name, 0.0))) for name in SERVO_PARAMETERS if name != "backlash"}}
-
-
-VAGUE = 0.5
-"""Standard error, as a share of the value, from which on a parameter is reported as unidentified."""
 
 ALIKE = 1.5
 """Error on held-out logs, over that on the fitted ones, up to which a model holds."""
 
-EXPLAINED = 3.0
-"""Residual over what rounding leaves, up to which there is nothing to explain: clocks of cheap servos jitter."""
+COUNTS = 0.1
+"""Counts below which residuals are said in rad: where a log is not rounded."""
 
-UNEXPLAINED = 20
-"""Counts of a typical residual from which on something is missing."""
+CONFOUNDED = 0.9
+"""Correlation from which on two parameters are hardly told apart: the error of each is then 2.3 times what it is with the other
+known."""
 
-EXPRESSIBLE = ("a", "b", "Ia", "Fs", "Fv", "offset", "delay", "rate", "backlash")
-"""Parameters that a file of MuJoCo has, or that its user adds to commands."""
+LAWS = {
+    "duty": "a V duty - b qd",
+    "torque": "a sat(kp (u - q) - kd qd)",
+    "current": "a sat(kp (u - q) - kd qd), of a current",
+}
+"""The law of each kind of loop, in words."""
 
-RATIOS = ("a", "b", "Ia", "Fs", "Fst")
-"""Parameters that only a known load tells apart."""
+MISTAKEN: Mapping[str, str] = {
+    "gain_error": "the gain of the loop is {factor:.3g} times what is stated",
+    "scale_error": "commands act as {factor:.4g} times what is logged: their unit, or a gear?",
+    "zero": "the zeros of commands and positions are {size:.4g} rad apart",
+    "lag": "commands are low-passed, by {size:.3g} s",
+    "lead": "the loop sees velocities, as if its position were {size:.3g} s early",
+    "dead_band": "the loop has a dead band of {size:.3g} rad",
+    "bias": "there is a constant torque of {size:.3g} N m: gravity that the file lacks, a spring, a cable?",
+    "Fo": "friction is larger while torque is off, by {size:.3g} N m",
+}
+"""What mistakes are, in words."""
 
 
 def print_servos(page: Page, fits: Mapping[str, ServoFit | str]) -> None:
     """Print parameters with their standard errors, and why some joints have none."""
     found = {joint: fit for joint, fit in fits.items() if isinstance(fit, ServoFit)}
     grid = new_table("", [f"{joint}\n{what}" for joint in found for what in ("", "sigma")])
-    for name, parameter in SERVO_PARAMETERS.items():
+    for name in SERVO_PARAMETERS:
         if any(name in fit.p for fit in found.values()):
             cells = (cell for fit in found.values() for cell in _cells(fit, name))
-            grid.add_row(f"{name} [{parameter.unit}]", *cells)
-    print_titled(page, "servos: torque = a V duty - b qd, friction and armature at the joint", grid)
+            grid.add_row(f"{name} [{unit_of(next(iter(found.values())).servo, name)}]", *cells)
+    laws = dict.fromkeys(LAWS[fit.servo.kind] for fit in found.values())
+    print_titled(page, f"servos: torque = {', or '.join(laws)}, friction and armature at the joint", grid)
     for joint, fit in fits.items():
         if isinstance(fit, str):
             page.print(Text(f"{joint}: no estimate: {fit}"), soft_wrap=True)
@@ -96,6 +66,9 @@ def _cells(fit: ServoFit, name: str) -> tuple[str, str]:
     if name not in fit.p:
         return "", ""
     sigma = fit.standard_errors.get(name)
+    if name in TORQUES and not fit.scaled and name not in fit.known:
+        low, high = fit.factor
+        return number(fit.p[name]), f"x {low:.2g} to {high:.2g}"
     return number(fit.p[name]), "held" if sigma is None else f"{sigma:.2g}"
 
 
@@ -108,9 +81,10 @@ def print_errors(page: Page, what: str, errors: Mapping[str, Array]) -> None:
         )
 
 
-def warnings_of(fits: Mapping[str, ServoFit | str]) -> list[str]:
-    """Return what to check, each thing once for all joints that it concerns."""
-    return _grouped((joint, text) for joint, fit in fits.items() if isinstance(fit, ServoFit) for text in _warnings(fit))
+def warnings_of(fits: Mapping[str, ServoFit | str], mistakes: Collection[str] = ()) -> list[str]:
+    """Return what to check, each thing once for all joints that it concerns; `mistakes` are joints of which one was proved."""
+    every = ((joint, fit) for joint, fit in fits.items() if isinstance(fit, ServoFit))
+    return _grouped((joint, text) for joint, fit in every for text in _warnings(fit, joint in mistakes))
 
 
 def _grouped(said: Iterable[tuple[str, str]]) -> list[str]:
@@ -120,103 +94,115 @@ def _grouped(said: Iterable[tuple[str, str]]) -> list[str]:
     return [f"{', '.join(of)}: {text}" for text, of in joints.items()]
 
 
-def _warnings(fit: ServoFit) -> Iterator[str]:
+def _warnings(fit: ServoFit, mistaken: bool) -> Iterator[str]:
     if spikes := sum(int((~run.read_well).sum()) for run in fit.loop.runs):
         yield f"{spikes} positions are spikes, from which the joint came back at once: they are left out"
-    sigma = fit.standard_errors
-    if vague := [name for name in RATIOS if name in sigma and sigma[name] > VAGUE * abs(fit.p[name])]:
+    if not fit.explained:
         yield (
-            f"{', '.join(vague)} cannot be told apart: torque, friction and armature scale together where the known load is "
-            "small. Move the joint through gravity, or add a known mass to the robot's file"
+            f"commands explain the motion to {fit.scale:.2g} rad only, of {fit.excitation.range:.2g} rad: are kp, gain and "
+            "counts right, and does the joint move freely?"
         )
-    if not fit.excitation.off:
+    elif not fit.scaled:
+        named = ", ".join(name for name in TORQUES if name in fit.p and name not in fit.known)
+        low, high = fit.factor
+        why = "gravity is free as well" if "Mg" in fit.free else "the known load is small beside them"
+        way = "for torques log more motion, add a known mass to the robot's file, or give one of them (--hold a=0.5)"
+        if mistaken:
+            why, way = "something is wrong", "mend that first: it is named below"
+        elif fit.scale > REMAINING * fit.excitation.range:
+            why, way = "the model lacks something", "first find out what: kp, gain, zeros, units, torque that was off unlogged?"
+        yield (
+            f"{named} are known up to a common factor ({low:.2g} to {high:.2g}), because {why}. Positions are predicted all "
+            f"the same; {way}"
+        )
+    kind = fit.servo.kind
+    if kind == "duty" and not fit.excitation.off and "b" in fit.free:
         yield "torque is never off, so b is the sum of back-EMF and viscous friction, and Fv is 0"
-    if "rate" not in fit.free:
+    if kind == "duty" and "rate" not in fit.free:
         yield "no command is faster than the rate limit of the firmware, if there is one"
-    if fit.scale > UNEXPLAINED * fit.servo.step:
-        yield (
-            f"residuals of {fit.scale:.2g} rad are {fit.scale / fit.servo.step:.0f} counts: try --friction auto, "
-            "--find lead backlash, and check kp, supply and the mass of the load"
-        )
 
 
-def inexpressible(fits: Mapping[str, ServoFit]) -> list[str]:
-    """Return what MuJoCo's servos do not have of what was found."""
-    lost = dict.fromkeys(x for fit in fits.values() for x in fit.free if x not in EXPRESSIBLE)
-    meanings = ", ".join(f"{x} ({SERVO_PARAMETERS[x].meaning})" for x in lost)
-    found = [f"MuJoCo's dcmotor cannot express {meanings}: the errors in plain MuJoCo include that"] if lost else []
-    if any("backlash" in fit.free for fit in fits.values()):
-        found.append("backlash is written as a second joint; the loop of the dcmotor sees the rotor, before the play")
-    offsets = {joint: fit.p["offset"] for joint, fit in fits.items()}
-    words = ", ".join(f"{joint} {x:+.4g}" for joint, x in offsets.items())
-    return [*found, f"the file's angles are the log's plus an offset [rad]: {words}; add it to commands"]
+def confounded(fit: ServoFit) -> str:
+    """Return by how much armature stands for a delay, if the log hardly tells them apart; empty if it does."""
+    if not {"Ia", "delay"} <= set(fit.free):
+        return ""
+    Ia, delay = (fit.free.index(name) for name in ("Ia", "delay"))
+    C = fit.covariance
+    if C[delay, delay] <= 0 or abs(C[Ia, delay]) < CONFOUNDED * np.sqrt(C[Ia, Ia] * C[delay, delay]):
+        return ""
+    per_ms = 1e-3 * C[Ia, delay] / C[delay, delay]
+    return f"Ia and delay are hardly told apart: {per_ms:+.2g} kg m^2 for each ms"
 
 
-def without_servo(joints: Sequence[str], fits: Mapping[str, ServoFit]) -> list[str]:
-    """Return which joints of a written file have no servo."""
-    lost = [joint for joint in joints if joint not in fits]
-    return [f"{', '.join(lost)}: no servo is written; what the robot's file has there stays"] if lost else []
+def verdicts(
+    fits: Mapping[str, ServoFit],
+    fitted: Mapping[str, Array],
+    held_out: Mapping[str, Array],
+    moved: Mapping[str, float],
+    mistakes: Mapping[str, ServoMistake],
+) -> list[str]:
+    """Return lines: whether models hold on logs that they did not see, and where their residuals are largest.
+
+    Parameters
+    ----------
+    fits, fitted, held_out
+        By joint: the fit, and mean errors of positions in the fitted and in the held-out logs [rad].
+    moved : mapping of str to float
+        Rms of the motion of the held-out logs about its mean [rad].
+    mistakes : mapping of str to ServoMistake
+        What was proved to be wrong.
+    """
+    said = [
+        (joint, _holds(fit, fitted[joint], held_out.get(joint), moved.get(joint, 0.0), joint in mistakes))
+        for joint, fit in fits.items()
+    ]
+    words = [(joint, mistake_words(mistake)) for joint, mistake in mistakes.items()]
+    alike = [(joint, text) for joint, fit in fits.items() if (text := confounded(fit))]
+    lacks = [(joint, _lacks(fit)) for joint, fit in fits.items()]
+    return [line for lines in (said, words, alike, lacks) for line in _grouped(lines)]
 
 
-def verdicts(fits: Mapping[str, ServoFit], fitted: Mapping[str, Array], held_out: Mapping[str, Array]) -> list[str]:
-    """Return lines: whether models hold on logs that they did not see, and where their residuals are largest."""
-    said = ((joint, _holds(fit, fitted[joint], held_out.get(joint))) for joint, fit in fits.items())
-    return [*_grouped(said), *_grouped((joint, _lacks(fit)) for joint, fit in fits.items())]
+def mistake_words(mistake: ServoMistake) -> str:
+    """Return what is wrong, how sure, what else it may be, and what was proved to mend it."""
+    what = MISTAKEN[mistake.letter].format(size=mistake.size, factor=1 + mistake.size)
+    others = f"; or {', '.join(mistake.alternatives)}, which this log cannot distinguish" if mistake.alternatives else ""
+    before, after = mistake.errors
+    return (
+        f"{what} (p = {mistake.p:.0g}){others}; with --find {mistake.letter} the error of parts that were not fitted "
+        f"falls from {before:.2g} to {after:.2g} rad"
+    )
 
 
-def _holds(fit: ServoFit, fitted: Array, held_out: Array | None) -> str:
+def _holds(fit: ServoFit, fitted: Array, held_out: Array | None, moved: float, mistaken: bool) -> str:
     if held_out is None:
         return "no held-out log says whether the model holds elsewhere (name a second log)"
-    floor, ratio = fit.servo.step / 4, float(np.mean(held_out) / np.mean(fitted))
-    if ratio <= ALIKE or np.mean(held_out) <= 2 * floor:
-        return "the model holds on other logs"
-    return f"the model does not hold on other logs: its error there is {ratio:.2g} times that on the fitted ones"
+    floor, ratio = fit.loop.step / 4, float(np.mean(held_out) / max(float(np.mean(fitted)), TINY))
+    share = 100 * float(np.mean(held_out)) / max(moved, TINY)
+    off = f"its mean error there is {error_percentage(share)} of the motion"
+    best = "fair" if mistaken or not fit.explained else "good"
+    if np.mean(held_out) <= 2 * floor:
+        return f"{best}: the model holds on other logs, {off}"
+    word = best if share <= GOOD else "fair" if share <= FAIR else "poor"
+    if ratio > ALIKE and share > GOOD:
+        word = "poor" if share > FAIR else "fair"
+        return f"{word}: the model does not hold on other logs: {off}, {ratio:.2g} times that on the fitted ones"
+    return f"{word}: the model holds on other logs, {off}"
 
 
 def _lacks(fit: ServoFit) -> str:
-    lacks, floor = lacks_of(fit), fit.servo.step / 4  # what rounding leaves, on average
-    if lacks[0].error <= EXPLAINED * floor:
+    lacks, step = lacks_of(fit), fit.loop.step
+    if lacks[0].error <= EXPLAINED * step / 4:  # what rounding leaves, on average
         return "its residuals are little more than the rounding of the encoder"
-    parts = ", ".join(f"{lack.error / fit.servo.step:.2g} counts while {lack.when}" for lack in lacks)
-    return f"mean residuals: {parts}"
+    in_counts = step > 0 and lacks[0].error < step / COUNTS
+    sizes = [f"{lack.error / step:.2g} counts" if in_counts else f"{lack.error:.2g} rad" for lack in lacks]
+    return f"mean residuals: {', '.join(f'{size} while {lack.when}' for size, lack in zip(sizes, lacks, strict=True))}"
 
 
 def print_choice(page: Page, joint: str, choice: ServoFrictionChoice) -> None:
     """Print laws of friction compared by parts of the log that their fits did not see."""
     first = next(iter(choice.errors))
-    grid = new_table("law", ["counts", f"p, against {first}"])
+    grid = new_table("law", ["mrad", f"p, against {first}"])
     for law, error in choice.errors.items():
         p = f"{choice.p[law]:.2g}" if law in choice.p else ""
-        grid.add_row(f"{law}{' (chosen)' if law == choice.chosen else ''}", number(error / choice.fits[law].servo.step), p)
+        grid.add_row(f"{law}{' (chosen)' if law == choice.chosen else ''}", number(1e3 * error), p)
     print_titled(page, f"{joint}: laws of friction, by the error of parts of the log that their fits did not see", grid)
-
-
-def values_of(servos: Servos, fit: ServoFit, joint: str) -> ServoValues:
-    """Return a servo as MuJoCo has it, with the firmware gain of the file."""
-    p, servo = fit.p, servos.known.servo(joint, "")
-    known = servo.gain * servo.kp, servo.supply, servo.duty_limit
-    rate, play = p.get("rate", np.inf), p.get("backlash", 0.0)
-    return ServoValues(p["a"], p["b"], *known, p["Ia"], p["Fv"], p["Fs"], rate, p["delay"], play)
-
-
-def mjcf_of(servos: Servos, fits: dict[str, ServoFit], folder: Path, position: bool = False) -> str:
-    """Return the robot's MJCF with the servos that were found."""
-    place = {servos.place(joint): values_of(servos, fit, joint) for joint, fit in fits.items()}
-    return with_servos(servos.robot, place, folder, servos.mounting, position)
-
-
-def in_mujoco(servos: Servos, text: str, folder: Path, fits: dict[str, ServoFit], path: Path) -> dict[str, float]:
-    """Return the mean absolute error [rad] of each joint, a log's commands given to the written file in plain MuJoCo."""
-    columns, known = servos.logs[path], servos.known
-    places = [servos.place(joint) for joint in fits]
-    offset = np.zeros(servos.links.n)
-    offset[places] = [fit.p["offset"] for fit in fits.values()]
-    if any(known.servo(joint, path.name).kp != known.servo(joint, "").kp for joint in fits):
-        raise ExperimentError(f"{path.name} has another kp than the file that was written")
-    if servos.links_of(path) is not servos.links:
-        raise ExperimentError(f"{path.name} is of another robot than the file that was written")
-    on = None if columns.on is None else columns.on[:, places] > 0.5
-    sent = Commands(columns.t, (columns.command + offset)[:, places], places, on)
-    q = replay(servos.robot, text, folder, sent, columns.q[0] + offset)
-    error = np.abs(q - columns.q - offset).mean(axis=0)
-    return {joint: float(error[j]) for joint, j in zip(fits, places, strict=True)}

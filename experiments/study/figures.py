@@ -8,7 +8,7 @@ from matplotlib.axes import Axes as Panel
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
-from idbench.experiments.reports.figures import svg
+from idbench.experiments.reports.drawn import svg
 from idbench.experiments.study.answer import in_words, value
 from idbench.experiments.study.axis import Axis
 from idbench.experiments.study.statistics import RIGHT, Cell

@@ -12,7 +12,8 @@ from idbench.experiments.study.statistics import BOUNDS
 from idbench.identify import MotionLog
 from idbench.identify.basis.block import named
 from idbench.identify.files.servo_log import ServoColumns
-from idbench.identify.servo import Servo, ServoFit, ServoRun, identify_servo, parameters_of
+from idbench.identify.servo import ServoFit, ServoRun, identify_servo, parameters_of
+from idbench.identify.servo.fit import TORQUES
 from idbench.sim.drives import ServoDrive
 from idbench.sim.engine.run import Run
 from idbench.sim.robot.payload import Payload
@@ -69,7 +70,7 @@ def truth_of(scenario: Scenario) -> dict[str, float]:
 def servo_columns(law: str, simulated: Run, i: int) -> dict[str, float] | str:
     """Return the parts of every parameter that one run gives, by their names, or why it gives none.
 
-    Joints that are refused have none.
+    Joints that are refused have none, and torques without a scale are left out.
     """
     truth = truth_of(simulated.scenario)
     found, why = dict[str, float](), list[str]()
@@ -79,14 +80,16 @@ def servo_columns(law: str, simulated: Run, i: int) -> dict[str, float] | str:
             why.append(str(fit))
             continue
         for name, sigma in fit.standard_errors.items():
+            if name in TORQUES and not fit.scaled:
+                continue
             at, bound = named(name, j), fit.bound[name]
             found |= {at: fit.p[name], f"{at}.sigma": sigma, f"{at}.paper_sigma": bound, f"{at}.truth": truth.get(at, np.nan)}
             found |= dict.fromkeys((at + part for part in BOUNDS), bound)
     return found or "; ".join(why)
 
 
-def _identified(law: str, _joint: int, servo: Servo, runs: Sequence[ServoRun]) -> ServoFit:
-    return identify_servo(servo, runs, *law_of(law))
+def _identified(law: str, _joint: int, runs: Sequence[ServoRun]) -> ServoFit:
+    return identify_servo(runs, *law_of(law))
 
 
 def rows_of(
@@ -107,10 +110,10 @@ def _joints(scenario: Scenario, log: MotionLog) -> Joints:
     assert isinstance(scenario.drive, ServoDrive)
     on, servos = log.conditions.get("on"), known_servos(scenario.drive, log.n)
     columns = ServoColumns(
-        log.t, log.q, log.conditions["command"], None if on is None else np.broadcast_to(on, log.q.shape), None, ()
+        log.t, log.q, log.conditions["command"], None if on is None else np.broadcast_to(on, log.q.shape), None
     )
     robot = _links(scenario.robot, scenario.payload)
-    return Joints(robot, tuple(servos), (JointsLog("the log", columns, tuple(servo.kp for servo in servos), robot),))
+    return Joints(robot, (JointsLog("the log", columns, tuple(servos), robot),))
 
 
 @cache

@@ -18,7 +18,7 @@ CONFIDENCE = 0.95
 DRAWS = 300
 """Of a bootstrap: its ends are then known to a tenth of its width."""
 
-RIGHT = float(2 * scipy.stats.norm.cdf(SIGMAS) - 1)
+RIGHT = float(2 * scipy.special.ndtr(SIGMAS) - 1)
 """Coverage if sigma is right and errors are normal."""
 
 MIN_ERROR = 1e-16
@@ -84,7 +84,7 @@ class Cell:
     @property
     def bias_margin(self) -> Array:
         """Half the width of the confidence interval of the bias (Student's t), shape (p,)."""
-        t = scipy.stats.t.ppf((1 + CONFIDENCE) / 2, max(self.runs - 1, 1))
+        t = scipy.special.stdtrit(max(self.runs - 1, 1), (1 + CONFIDENCE) / 2)
         return t * self.deviation / np.sqrt(self.runs)
 
     @property

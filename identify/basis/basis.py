@@ -185,7 +185,7 @@ class Basis:
         """Return what a column function of every block gives, together."""
         shape, total = (*state.q.shape[:-2], state.q.shape[-1]), dict[tuple[int, int], Array]()
         for block in self.blocks:
-            held, found = self._held_of(block), getattr(block, function)(state)
+            held, found = self.held_of(block), getattr(block, function)(state)
             if not isinstance(found, Mapping):
                 raise PluginError(
                     f"plug-in {type(block).__name__}.{function} returned {found!r:.60}, expected a mapping of columns"
@@ -201,7 +201,7 @@ class Basis:
                     total[row, HELD] = total.get((row, HELD), 0.0) + np.asarray(held[parameter])[..., None] * signal
         return total
 
-    def _held_of(self, block: AbstractBlock) -> dict[Parameter, Array | float]:
+    def held_of(self, block: AbstractBlock) -> dict[Parameter, Array | float]:
         """Return what the columns of a block that are no part of W X are multiplied by.
 
         With a slope F g'(b) as the column of b, F g(b) + F g'(b) (b - b0) has - F g'(b) b0 that depends on no parameter.

@@ -143,7 +143,7 @@ class TreeLinks(AbstractConservativeBlock):
         """Return ten parameters for each link that has mass; raise SettingError unless the tree has `n` joints."""
         if n != self.tree.n:
             raise SettingError(f"robot {self.tree.name!r} has {self.tree.n} joints, not {n}")
-        return tuple(parameter for j in self._massive for parameter in _parameters(j))
+        return tuple(parameter for j in self._massive for parameter in parameters_of_link(j))
 
     def narrowed(self, parameters: Set[Parameter]) -> Self:
         """Return this block without the work for other parameters."""
@@ -196,14 +196,14 @@ class TreeLinks(AbstractConservativeBlock):
         """Return the columns of (row, link) that are asked for and not zero at all times."""
         shape, found = state.q[..., 0, :].shape, {}
         for i, j in rows:
-            for x, parameter in enumerate(_parameters(j)):
+            for x, parameter in enumerate(parameters_of_link(j)):
                 if (self.only is None or parameter in self.only) and not is_zero(term := column(i, j, x)):
                     found[i, parameter] = np.broadcast_to(term, shape)
         return found
 
 
 @cache
-def _parameters(j: int) -> tuple[Parameter, ...]:
+def parameters_of_link(j: int) -> tuple[Parameter, ...]:
     """Return the ten parameters of a link."""
     return tuple(Parameter(x, j, *what) for x, what in KINDS.items())
 

@@ -169,6 +169,10 @@ class Placement:
         y = apply(self._back, x)
         return self._turned(y, -1.0) if self._hinge else y
 
+    def outward(self, x: Vector) -> Vector:
+        """Return in the frame of the parent what `x` is in that of the link."""
+        return apply(self._rotation, self._turned(x, 1.0) if self._hinge else x)
+
     def carry(self, twist: Twist) -> Twist:
         """Return a twist of the parent as one of the link."""
         return Twist(self.inward(add(twist.v, cross(twist.w, self.position))), self.inward(twist.w))
@@ -187,11 +191,11 @@ class Twists:
 
     def __init__(self, tree: KinematicTree, state: State) -> None:
         self._tree, self._state = tree, proxy(state)  # the state keeps its twists: a circle would outlive long logs' pieces
-        self._placements = [Placement(joint, state.q[..., j, :]) for j, joint in enumerate(tree.joints)]
+        self.placements = [Placement(joint, state.q[..., j, :]) for j, joint in enumerate(tree.joints)]
 
     def _links(self) -> Iterator[tuple[int, int, Placement]]:
         """Yield the number of each link, that of its parent, and its placement."""
-        for j, (joint, placement) in enumerate(zip(self._tree.joints, self._placements, strict=True)):
+        for j, (joint, placement) in enumerate(zip(self._tree.joints, self.placements, strict=True)):
             yield j, joint.parent, placement
 
     @cached_property
@@ -240,12 +244,12 @@ class Twists:
     @cached_property
     def unit(self) -> list[dict[int, Twist]]:
         """S_i in the frame of every link that joint i moves: dV_j / dqd_i."""
-        return self._carried([at.S for at in self._placements])
+        return self._carried([at.S for at in self.placements])
 
     @cached_property
     def slope(self) -> list[dict[int, Twist]]:
         """dV_j / dq_i = [V_i, S_i], in the frame of every link that joint i moves."""
-        return self._carried([bracket(V, at.S) for V, at in zip(self.velocity, self._placements, strict=True)])
+        return self._carried([bracket(V, at.S) for V, at in zip(self.velocity, self.placements, strict=True)])
 
     def _carried(self, own: list[Twist]) -> list[dict[int, Twist]]:
         found: list[dict[int, Twist]] = []

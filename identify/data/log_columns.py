@@ -31,6 +31,10 @@ class LogColumns:
     """Shape (time, joint or 1), optional [deg C]."""
     gain: tuple[float, ...] = ()
     """Torque over what the file has, joint by joint: the torques have been multiplied by it."""
+    missing: tuple[int, ...] = ()
+    """Joints, from 0, whose torques the file does not have; they are 0 here."""
+    integrated: bool = False
+    """Whether positions are integrals of velocities, from 0: none were logged."""
     said: str = ""
     """Which file says what the columns are, and in which units; empty if that was the log itself."""
 
@@ -79,5 +83,12 @@ class LogColumns:
             warm = warm[:, place]
         torque = None if self.torque is None else self.torque.ordered(place)
         return replace(
-            self, q=self.q[:, place], tau=self.tau[:, place], qd=qd, torque=torque, temperature=warm, joints=tuple(joints)
+            self,
+            q=self.q[:, place],
+            tau=self.tau[:, place],
+            qd=qd,
+            torque=torque,
+            temperature=warm,
+            joints=tuple(joints),
+            missing=tuple(k for k, j in enumerate(place) if j in self.missing),
         )

@@ -80,18 +80,15 @@ class TorqueChannel:
 
     def ordered(self, places: Sequence[int]) -> "TorqueChannel":
         """Return the channel of joints in another order."""
-
-        def moved(x: float | tuple[float, ...]) -> float | tuple[float, ...]:
-            return tuple(x[k] for k in places) if isinstance(x, tuple) and x else x
-
-        lags = tuple(self.lags[k] for k in places) if self.lags else ()
-        return replace(self, gain=moved(self.gain), delay_sigma=moved(self.delay_sigma), lags=lags)
+        gain, sigma, lags = (
+            tuple(x[k] for k in places) if isinstance(x, tuple) and x else x for x in (self.gain, self.delay_sigma, self.lags)
+        )
+        return replace(self, gain=gain, delay_sigma=sigma, lags=lags if isinstance(lags, tuple) else ())
 
     @property
     def late(self) -> str:
         """The delay, or that of each joint, in words."""
-        each = [self.delay + lag for lag in self.lags] or [self.delay]
-        return f"{', '.join(f'{1e3 * delay:.4g}' for delay in each)} ms"
+        return f"{', '.join(f'{1e3 * (self.delay + lag):.4g}' for lag in self.lags or (0.0,))} ms"
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,6 +118,10 @@ class MotionLog:
     ``command`` of servos [rad], and ``on``, 1 where their torque is, shape (..., time, joint or 1)."""
     joints: tuple[str, ...] = ()
     """Names of the joints, where they are known."""
+    missing: tuple[int, ...] = ()
+    """Joints, from 0, whose torques were not logged: whatever `tau` has there, no row is made of it."""
+    poses: bool = False
+    """Whether each sample is a pose at rest, by itself: there are no velocities, and nothing between two samples."""
 
     def __repr__(self) -> str:
         runs = f"{np.prod(self.q.shape[:-2], dtype=int)} runs of " if self.q.ndim > 2 else ""
@@ -159,6 +160,9 @@ class MotionLog:
         object.__setattr__(self, "conditions", {name: self._condition(name, x) for name, x in self.conditions.items()})
         if len(self.joints) not in (0, self.n):
             raise LogError(f"{len(self.joints)} names for {self.n} joints: {', '.join(self.joints)}")
+        object.__setattr__(self, "missing", tuple(sorted({int(j) for j in self.missing})))
+        if self.missing and not (self.missing[0] >= 0 and self.missing[-1] < self.n and len(self.missing) < self.n):
+            raise LogError(f"missing = {self.missing} must be some of the joints 0 to {self.n - 1}, not all of them")
         if np.size(self.torque.gain) not in (1, self.n):
             raise LogError(f"{np.size(self.torque.gain)} torque gains for {self.n} joints: give one, or one per joint")
         for name in ("lags", "delay_sigma"):
@@ -187,6 +191,11 @@ class MotionLog:
         """Time of every sample [s], shape (time,), from 0."""
         return np.arange(self.samples) / self.fs
 
+    @property
+    def unchanging(self) -> tuple[int, ...]:
+        """Joints, from 0, whose torque is the same in all samples: not driven, or not logged though there is a column."""
+        return tuple(j for j in range(self.n) if j not in self.missing and not np.ptp(self.tau[..., j], axis=-1).any())
+
     def part(self, first: int, end: int) -> "MotionLog":
         """Return the samples `first` ... `end` - 1 as a log of its own."""
         q, tau, *others = (x[..., first:end, :] for x in (self.q, self.tau, *self.conditions.values()))
@@ -205,6 +214,7 @@ class MotionLog:
         tau: npt.ArrayLike,
         torque: TorqueChannel,
         conditions: Mapping[str, Array] | None = None,
+        missing: Sequence[int] = (),
     ) -> Self:
         """Make a log from samples at the times `t`, which must be uniform.
 
@@ -212,7 +222,7 @@ class MotionLog:
         ----------
         t : array_like, shape (time,)
             Sample times [s], increasing, their steps within 1 % of the mean step.
-        q, tau, torque, conditions
+        q, tau, torque, conditions, missing
             As for the class.
 
         Raises
@@ -224,8 +234,8 @@ class MotionLog:
         --------
         >>> import numpy as np
         >>> from idbench.identify import MotionLog, TorqueChannel
-        >>> t = np.arange(100) / 250.0
-        >>> log = MotionLog.at_times(t, np.zeros((100, 2)), np.zeros((100, 2)), TorqueChannel("instantaneous"))
+        >>> q = np.zeros((100, 2))
+        >>> log = MotionLog.at_times(np.arange(100) / 250.0, q, q, TorqueChannel("instantaneous"))
         >>> round(log.fs), log.n, log.samples
         (250, 2, 100)
         """
@@ -234,7 +244,12 @@ class MotionLog:
             raise LogError(f"q has shape {positions.shape}, not (..., time, joint)")
         if times.shape != positions.shape[-2:-1]:
             raise LogError(f"t has shape {times.shape}, q {positions.shape}: one time is needed for each sample of q")
-        return cls(sampling_frequency(times), positions, _real("tau", tau), torque, conditions or {})
+        return cls(sampling_frequency(times), positions, _real("tau", tau), torque, conditions or {}, (), tuple(missing))
+
+
+def never_logged(logs: Sequence[MotionLog]) -> tuple[int, ...]:
+    """Return the joints whose torque no log of several has."""
+    return tuple(sorted(set.intersection(*(set(log.missing) for log in logs))))
 
 
 def sampling_frequency(t: Array) -> float:

@@ -168,7 +168,7 @@ def _uniform(part: LogColumns, torque: TorqueChannel, fs: float) -> tuple[Motion
     steps = np.diff(part.t)
     as_is = part.t_tau is None and np.abs(steps * fs - 1).max() < 1e-3
     log = MotionLog(fs, part.q, part.tau, torque) if as_is else resample(part.t, part.q, part.tau, torque, fs, part.t_tau)
-    log = replace(log, conditions=_conditions(part, log, as_is=as_is))
+    log = replace(log, conditions=_conditions(part, log, as_is=as_is), missing=part.missing)
     if part.qd is None or not np.isfinite(part.qd).all() or log.samples < LEAST_VELOCITIES:
         return log, None
     start = 0.0 if as_is else max(part.t[0], part.t_tau[0]) if part.t_tau is not None else part.t[0]

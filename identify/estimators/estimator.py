@@ -52,7 +52,7 @@ class AbstractEstimator(ABC):
         PluginError
             If it returns something else than an estimate of all parameters.
         """
-        self._require(problem)
+        self.require(problem)
         estimate, status = self.solve(problem), problem.factors.together.status
         if throw and self.full_rank:
             problem.factors.together.check()
@@ -76,7 +76,9 @@ class AbstractEstimator(ABC):
             )
         return estimate
 
-    def _require(self, problem: Problem) -> None:
+    @final
+    def require(self, problem: Problem) -> None:
+        """Raise IdentificationError if a problem lacks what this estimator needs."""
         self.require_needs()
         if problem.prior is not None and not self.takes_prior:
             raise IdentificationError(f"{self.called} takes nothing that is known before: use GLS, WLS or OLS")
@@ -89,6 +91,20 @@ class AbstractEstimator(ABC):
             raise IdentificationError(
                 f"{self.called} simulates the robot from the torques of the log, and the caller gave no simulator"
             )
+        if missing := sorted({j + 1 for log in problem.logs for j in log.missing}):
+            of = f"the torque of joint {', '.join(map(str, missing))} was not logged"
+            if self.needs & {"logs", "loop", "plant"}:
+                raise IdentificationError(f"{of}, and {self.called} needs those of all: use GLS, WLS or OLS")
+            if not problem.some_rows.valid.any():
+                raise IdentificationError(f"{of}, and the sum over joints needs it: take the explicit or the implicit model")
+        if any(log.poses for log in problem.logs):
+            if self.needs & {"logs", "loop", "plant"}:
+                raise IdentificationError(f"poses at rest hold no motion, and {self.called} needs one: use GLS, WLS or OLS")
+            if problem.basis.n * sum(log.samples for log in problem.logs) < len(problem.names):
+                count = sum(log.samples for log in problem.logs)
+                raise IdentificationError(f"{count} poses are too few for {len(problem.names)} parameters: log more")
+            if not problem.alike:
+                raise IdentificationError("poses at rest have no power: take the explicit or the implicit model")
         if "rows" in self.needs:
             problem.require_rows(f"{self.called} needs rows, and ")
 

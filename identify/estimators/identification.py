@@ -157,6 +157,7 @@ def estimate(problem: Problem, estimator: AbstractEstimator, *, throw: bool = Tr
     """
     _require(estimator, AbstractEstimator, 'an estimator, such as ESTIMATORS.create("OLS")')
     with one_thread(), blamed():
+        estimator.require(problem)
         if throw and estimator.full_rank and not problem.long:  # of long logs it is reported as they are solved
             problem.factors.together.check()
         return estimator.fit(problem, throw=throw)

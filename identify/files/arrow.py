@@ -3,6 +3,7 @@
 import gzip
 import re
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 from typing import IO, TYPE_CHECKING, Any
@@ -11,6 +12,7 @@ import numpy as np
 
 from idbench.identify.arrays import Array
 from idbench.identify.errors import LogError
+from idbench.identify.files.lerobot import names_beside
 from idbench.identify.files.table import LogTable, require_room
 
 if TYPE_CHECKING:
@@ -61,8 +63,8 @@ def read_text(path: Path) -> LogTable:
         read = csv.ReadOptions(skip_rows=skipped, column_names=names or None)
         parse = csv.ParseOptions(delimiter=mark.decode())
         convert = csv.ConvertOptions(decimal_point=_decimal(path, skipped, mark))
-        with _opened(path) as file:
-            table = csv.read_csv(file, read_options=read, parse_options=parse, convert_options=convert)
+        held: Any = _held(path)  # the stubs know files of Python alone
+        table = csv.read_csv(held, read_options=read, parse_options=parse, convert_options=convert)
     except UnicodeDecodeError as error:
         raise LogError(f"cannot read the log {path}: byte {error.start} of its header is no UTF-8; save it as UTF-8") from error
     except (pa.ArrowException, gzip.BadGzipFile, EOFError) as error:
@@ -79,18 +81,36 @@ def read_parquet(path: Path) -> LogTable:
     from pyarrow import parquet
 
     try:
-        with path.open("rb") as file:
-            table = _numeric(path, parquet.ParquetFile(file))
+        table = _numeric(path, parquet.ParquetFile(_held(path)))
     except pa.ArrowException as error:
         words = str(error).splitlines()[0]
         raise LogError(f"cannot read the log {path} as Parquet (a CSV file's name must end with .csv): {words}") from error
     cleaned = [name.strip(' "') for name in table.column_names]
     _require_single(path, cleaned)
-    return _table(cleaned, map(_entries, table.columns), (table.schema.metadata or {}).get(TORQUE))
+    made = _table(cleaned, map(_entries, table.columns), (table.schema.metadata or {}).get(TORQUE))
+    return replace(made, entries={name: x for name, x in names_beside(path).items() if _has(made, name, len(x))})
+
+
+def _has(table: LogTable, name: str, entries: int) -> bool:
+    return name in table.columns and table.columns[name].shape[1:] == (entries,)
 
 
 def _opened(path: Path) -> IO[bytes]:
     return gzip.open(path, "rb") if path.suffix.lower() == ".gz" else path.open("rb")  # type: ignore[return-value]
+
+
+def _held(path: Path) -> "pa.BufferReader":
+    """Return what a file holds, in memory of pyarrow's own.
+
+    Its threads that read a file of Python's abort a process that ends meanwhile (apache/arrow 50482), and its own way to open
+    one takes names in UTF-8 alone.
+    """
+    pa = arrow()
+    with _opened(path) as file:
+        content = file.read()
+    held = pa.allocate_buffer(len(content))
+    memoryview(held).cast("B")[:] = content
+    return pa.BufferReader(held)
 
 
 def _head(path: Path) -> tuple[int, list[str], bytes]:
@@ -167,7 +187,7 @@ def _numeric(path: Path, file: Any) -> "pa.Table":
         kind = field.type
         if types.is_list(kind) or types.is_fixed_size_list(kind) or types.is_large_list(kind):
             kind, size = kind.value_type, size + 16
-        if types.is_floating(kind) or types.is_integer(kind) or types.is_null(kind):
+        if types.is_floating(kind) or types.is_integer(kind) or types.is_null(kind) or types.is_timestamp(kind):
             wanted, size = [*wanted, field.name], size + 8
         elif re.fullmatch(r"t|(q|tau)\d+", field.name.strip(' "')):
             raise LogError(f"{path}: column {field.name} holds {kind}, not numbers")
@@ -182,21 +202,41 @@ def _entries(column: "pa.ChunkedArray[Any]") -> Array | str:
     if not (pa.types.is_list(column.type) or pa.types.is_fixed_size_list(column.type) or pa.types.is_large_list(column.type)):
         return _numbers(column, 1)
     whole = column.combine_chunks()
-    lengths = set(pa.compute.list_value_length(whole).to_pylist())
-    if len(lengths) != 1 or None in lengths:
+    import pyarrow.compute  # which takes 60 ms, and most files hold no lists
+
+    lengths = set(pyarrow.compute.list_value_length(whole).to_pylist())
+    if None in lengths:
+        return f"no list in row {whole.is_null().to_pylist().index(True) + 1}"
+    if len(lengths) != 1:
         return "lists that differ in length"
     flat = whole.flatten()  # type: ignore[attr-defined]  # of lists
-    values: Array = flat.cast(pa.float64()).to_numpy(zero_copy_only=False).reshape(len(whole), -1)
-    return values
+    return _floats(flat).reshape(len(whole), -1)
+
+
+def _floats(column: Any) -> Array:
+    """Return numbers as float64; integers that are too large for it, such as times in ns, from their first value on."""
+    pa = arrow()
+    try:
+        return np.asarray(column.cast(pa.float64()).to_numpy(zero_copy_only=False))
+    except pa.ArrowInvalid:
+        values = np.asarray(column.to_numpy(zero_copy_only=False))
+        return np.asarray(values - values[0], dtype=np.float64)
 
 
 def _numbers(column: "pa.ChunkedArray[Any]", first: int) -> Array | str:
     """Return a column as numbers, an empty cell as NaN, which no log may have; what it holds if these are none."""
     pa = arrow()
+    if pa.types.is_temporal(column.type):
+        return _seconds(column)
     if not (pa.types.is_floating(column.type) or pa.types.is_integer(column.type) or pa.types.is_null(column.type)):
         return f"{column.type}, not numbers{_culprit(column, first)}"
-    values: Array = column.cast(pa.float64()).to_numpy()
-    return values
+    return _floats(column.combine_chunks() if column.num_chunks > 1 else column.chunk(0)) if column.num_chunks else np.empty(0)
+
+
+def _seconds(column: "pa.ChunkedArray[Any]") -> Array:
+    """Return dates or times of the day [s], from the first on."""
+    values = column.to_numpy().astype("datetime64[ns]")
+    return np.asarray((values - values[0]) / np.timedelta64(1, "s"), dtype=np.float64)
 
 
 def _culprit(column: "pa.ChunkedArray[Any]", first: int) -> str:

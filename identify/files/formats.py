@@ -7,6 +7,7 @@ from pathlib import Path
 from idbench.identify.errors import LogError
 from idbench.identify.files.arrays import read_matlab, read_numpy
 from idbench.identify.files.arrow import read_parquet, read_text
+from idbench.identify.files.lerobot import data_file, is_data_set
 from idbench.identify.files.ros_bag import read_bag
 from idbench.identify.files.table import LogTable
 
@@ -24,6 +25,16 @@ FORMATS: dict[str, Callable[[Path], LogTable]] = {
     ".mcap": read_bag,
 }
 """Readers by what a file's name ends with, `.gz` aside."""
+
+CODE = "it may run code when it is loaded; load it where it was made, and save its arrays with numpy.savez"
+TREE = "it has no columns; save those of the log, such as with pandas.DataFrame(...).to_csv"
+
+FOREIGN = {
+    **dict.fromkeys((".pkl", ".pt", ".pth"), CODE),
+    **dict.fromkeys((".json", ".jsonl", ".yaml", ".yml"), TREE),
+    **dict.fromkeys((".h5", ".hdf5", ".feather", ".arrow", ".xlsx", ".xls"), "save it as CSV or Parquet"),
+}
+"""What is not read, and the way out."""
 
 
 def kind_of(path: Path) -> str:
@@ -47,7 +58,11 @@ def read_table(path: Path) -> LogTable:
     LogError
         If it cannot be read, is of no kind that is known, or is empty.
     """
+    if is_data_set(path):
+        path = data_file(path)
     bag = path.is_dir() and (path / "metadata.yaml").is_file()
+    if not bag and (way_out := FOREIGN.get(kind_of(path))):
+        raise LogError(f"idbench reads no {kind_of(path)} ({path}): {way_out}. It reads {', '.join(FORMATS)}")
     reader = read_bag if bag else FORMATS.get(kind_of(path), read_parquet)
     try:
         if not bag:

@@ -12,7 +12,7 @@ from idbench.identify.arrays import Array
 from idbench.identify.errors import LogError
 from idbench.identify.files.formats import read_table
 from idbench.identify.files.guess_units import with_units
-from idbench.identify.files.layout import LogLayout, Source
+from idbench.identify.files.layout import UNLOGGED, LogLayout, Source
 from idbench.identify.files.table import LogTable
 
 WORDS = {
@@ -102,6 +102,8 @@ def guess(path: Path, table: LogTable | None = None) -> Guess:
         raise LogError(f"{path} has {table.rows} rows: too few to say what its columns are")
     found = _by_names(table) if table.named else _by_values(path, table)
     missing = [name for name in ("q", "tau") if not getattr(found, name).columns]
+    if missing == ["q"] and found.qd.columns:
+        missing = []  # velocities alone: they are integrated
     if missing:
         what = " and ".join({"q": "positions", "tau": "torques or currents"}[name] for name in missing)
         raise UnknownColumnsError(
@@ -128,13 +130,18 @@ def _episodes(table: LogTable) -> tuple[dict[str, float], list[str]]:
 def _alike(table: LogTable, found: LogLayout) -> list[str]:
     """Return doubts about columns that could have been taken in the place of others."""
     groups, doubts = _groups(table), list[str]()
-    n, torques = (sum(_entries(table, name) for name in source.columns) for source in (found.q, found.tau))
+    motion = found.q if found.q.columns else found.qd
+    n, torques = (sum(1 if name == UNLOGGED else _entries(table, name) for name in of.columns) for of in (motion, found.tau))
     if n != torques:
-        doubts.append(f"{n} columns of positions and {torques} of torques: one of each a joint")
+        what = "positions" if found.q.columns else "velocities"
+        doubts.append(f"{n} columns of {what} and {torques} of torques: one of each a joint")
     place = {name: place for names in groups.values() for name, place in names}
-    q, tau = ([place.get(name, "") for name in source.columns] for source in (found.q, found.tau))
+    q, tau = ([place.get(name, "") for name in source.logged] for source in (motion, found.tau))
     if n == torques and len(q) == len(tau) and set(q) != set(tau):
         doubts.append(f"positions are of {', '.join(q)}, torques of {', '.join(tau)}: are these the same joints?")
+    rest = [name for (of, _), names in groups.items() for name, _ in names if of == "tau" and name not in found.tau.columns]
+    if UNLOGGED in found.tau.columns and rest:
+        doubts.append(f"some joints have no column of torques like {found.tau.logged[0]}: are they {', '.join(rest)}?")
     for kind in ("t", "q", "tau"):
         chosen = set(getattr(found, kind).columns)
         for (of, _), names in groups.items():
@@ -149,6 +156,7 @@ def _by_names(table: LogTable) -> LogLayout:
     """Return a layout by what columns are called."""
     groups = _groups(table)
     found, n = LogLayout(q=Source(), tau=Source()), 0
+    places = list[str]()
     for kind in ("t", "q", "tau", "qd"):
         choices = {stem: names for (k, stem), names in groups.items() if k == kind}
         if kind == "t":
@@ -168,7 +176,15 @@ def _by_names(table: LogTable) -> LogLayout:
             named = len(names) == n and not any(re.fullmatch(r"\d*", place) for place in places)
             joints = table.entries.get(names[0][0], ()) if len(names) == 1 else tuple(places) if named else ()
             found = replace(found, joints=joints)
+        if kind == "tau" and len(names) < n and (of := {place: name for name, place in names}).keys() < set(places):
+            found = found.where("tau", Source(tuple(of.get(place, UNLOGGED) for place in places)))
     return found
+
+
+def kind_of(name: str) -> str:
+    """Return what the name of a column stands for, of `WORDS`; empty if it looks like none of them."""
+    found = _parsed(name)
+    return found.kind if found else ""
 
 
 class _Name(NamedTuple):

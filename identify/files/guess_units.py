@@ -25,7 +25,7 @@ def with_units(layout: LogLayout, table: LogTable) -> tuple[LogLayout, list[str]
         source: Source = getattr(layout, name)
         if not source.columns:
             continue
-        stated = named_unit(name, source.columns[0])
+        stated = named_unit(name, source.logged[0])
         unit = stated or _suspected(name, layout, table)
         if unit and not stated and unit != SI[name]:
             doubts.append(f"{name} in {unit}? Its values, or names, look like it")
@@ -48,8 +48,8 @@ def _suspected(quantity: str, layout: LogLayout, table: LogTable) -> str:
 
 def _values(table: LogTable, source: Source) -> Array:
     """Return the columns of a source, shape (row, column), to the end of the shortest."""
-    rows = min(len(table.columns[name]) for name in source.columns)
-    return np.concatenate([table.columns[name][:rows].reshape(rows, -1) for name in source.columns], axis=1)
+    rows = min(len(table.columns[name]) for name in source.logged)
+    return np.concatenate([table.columns[name][:rows].reshape(rows, -1) for name in source.logged], axis=1)
 
 
 def _largest(table: LogTable, source: Source) -> float:
@@ -57,19 +57,24 @@ def _largest(table: LogTable, source: Source) -> float:
 
 
 def _time_unit(table: LogTable, source: Source) -> str:
-    step = float(np.nanmedian(np.diff(table.columns[source.columns[0]])))
+    return unit_of_times(table.columns[source.columns[0]])
+
+
+def unit_of_times(t: Array) -> str:
+    """Return the unit that times look like by their steps; empty for s."""
+    step = float(np.nanmedian(np.diff(t)))
     return next((unit for unit, largest in (("", 0.5), ("ms", 200.0), ("us", 2e5)) if step < largest), "ns")
 
 
 def _torque_unit(table: LogTable, source: Source) -> str:
-    if any(word in re.findall("[a-z]+", name.lower()) for name in source.columns for word in CURRENTS):
+    if any(word in re.findall("[a-z]+", name.lower()) for name in source.logged for word in CURRENTS):
         return "mA" if _largest(table, source) > STRONGEST / 10 else "A"
     return "mN m" if _largest(table, source) > STRONGEST else ""
 
 
 def _velocity_unit(table: LogTable, layout: LogLayout) -> str:
     """Return the unit of velocities in which they are the derivatives of the positions."""
-    if not layout.t.columns:
+    if not layout.t.columns or not layout.q.columns:
         return ""
     t = table.columns[layout.t.columns[0]] * factor("t", layout.t.unit or "s")
     q = _values(table, layout.q) * factor("q", layout.q.unit or "rad")

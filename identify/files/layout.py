@@ -14,8 +14,15 @@ from idbench.identify.data.motion_log import TorqueChannel
 from idbench.identify.errors import IdentificationError, LogError
 from idbench.identify.files.table import SI, factor
 
-QUANTITIES = ("t", "q", "qd", "tau", "temperature")
+OF_SERVOS = ("command", "forward", "on", "voltage")
+"""What columns of logs of servos may be beside: commanded positions, what is commanded beside them, whether torque is on, and
+the supply."""
+
+QUANTITIES = ("t", "q", "qd", "tau", "temperature", *OF_SERVOS)
 """What columns may be."""
+
+UNLOGGED = ""
+"""Name of the column of a joint of which a quantity was not logged."""
 
 SINGULAR = 1e-12
 """Determinants below this are none."""
@@ -32,8 +39,8 @@ class Source:
     """Where a quantity of a log is."""
 
     columns: tuple[str, ...] = ()
-    """Names of its columns, joint by joint; or one that stands for several: a column of several entries, or a name with a * in
-    the place of numbers or names."""
+    """Names of its columns, joint by joint, empty of a joint that was not logged; or one that stands for several: a column of
+    several entries, or a name with a * in the place of numbers or names."""
     unit: str = ""
     """Theirs."""
     file: str = ""
@@ -42,6 +49,11 @@ class Source:
     """Column of that file with its own times, in the unit of t; by default those of the log."""
     fs: float | None = None
     """Sampling frequency [Hz] where there are no times."""
+
+    @property
+    def logged(self) -> tuple[str, ...]:
+        """Names of the columns that there are."""
+        return tuple(name for name in self.columns if name != UNLOGGED)
 
     def scale(self, quantity: str) -> float:
         """Return what turns its values into SI."""
@@ -70,6 +82,14 @@ class LogLayout:
     """Only rows in which these columns have these values: an episode."""
     temperature: Source = Source()  # frozen
     """Temperatures of the joints, or of all; without columns if there are none."""
+    command: Source = Source()  # frozen
+    """Commanded positions of servos."""
+    forward: Source = Source()  # frozen
+    """What is commanded beside: duty, torque or current."""
+    on: Source = Source()  # frozen
+    """Above 0.5 where torque is on."""
+    voltage: Source = Source()  # frozen
+    """Supply [V]."""
     motors: tuple[tuple[float, ...], ...] = ()
     """Of a log of motors: motor positions = matrix times joint positions; torques are turned by its dual."""
 
@@ -148,7 +168,9 @@ class LogLayout:
         lines = [f"joints = {json.dumps(list(self.joints), ensure_ascii=False)}"] if self.joints else []
         for name in QUANTITIES:
             source: Source = getattr(self, name)
-            if source != Source():
+            if name == "q" and not source.columns:
+                lines += ["", "[q]", "columns = []  # velocities are integrated"]
+            elif source != Source():
                 lines += ["", f"[{name}]", *_lines(source, SI[name])]
         lines += ["", "[torque]"]
         if self.torque:

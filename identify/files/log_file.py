@@ -104,4 +104,4 @@ def read_log(path: Path | str, torque: TorqueChannel | None = None, joints: Sequ
             f"{path} does not say what its torque means: instantaneous, held or averaged, and with what "
             "delay; say it with torque=TorqueChannel(...)"
         )
-    return MotionLog.at_times(found.t, found.q, found.tau, channel, found.conditions)
+    return MotionLog.at_times(found.t, found.q, found.tau, channel, found.conditions, found.missing)

@@ -13,14 +13,12 @@ from idbench.identify.data.motion_log import TorqueChannel
 from idbench.identify.errors import LogError
 from idbench.identify.files.formats import read_table
 from idbench.identify.files.guess import guess
-from idbench.identify.files.layout import LAYOUT, LogLayout, Source, matching
+from idbench.identify.files.layout import LAYOUT, UNLOGGED, LogLayout, Source, matching
+from idbench.identify.files.standard import standard_layout
 from idbench.identify.files.table import SI, LogTable, needs_gain
 
 CLOCKS = 1e6
 """Times [s] beyond this are those of a calendar: logs count from their beginning."""
-
-SHOWN = 20
-"""Columns of a file that a message names."""
 
 MIN_GAIN, MAX_GAIN = 1e-9, 1e9
 """Sizes of gains beyond which they are slips."""
@@ -51,18 +49,18 @@ def read_columns(path: Path, layout: LogLayout | None = None) -> LogColumns:
         files = [source.file for source in (layout.q, layout.t, layout.tau) if source.file]
         if not files:
             raise LogError(f'{path} names no file of the log: add a line such as file = "run.csv" before the tables')
-        return replace(_Files(path.parent / files[0], path.parent, layout).columns, said=layout.words(path))
+        return replace(LogFiles(path.parent / files[0], path.parent, layout).columns, said=layout.words(path))
     if layout:
-        return _Files(path, path.parent, layout).columns
+        return LogFiles(path, path.parent, layout).columns
     found, table = LogLayout.beside(path), None
     if found and found[1].name == LAYOUT:
         table = read_table(path)
         found = None if table.torque is not None else found  # what idbench wrote is no log of that folder's recorder
     if found:
-        return replace(_Files(path, found[1].parent, found[0]).columns, said=found[0].words(found[1]))
+        return replace(LogFiles(path, found[1].parent, found[0]).columns, said=found[0].words(found[1]))
     table = table or read_table(path)
     layout, said = _undoubted(path, table)
-    return replace(_Files(path, path.parent, layout, {path: table}).columns, said=said)
+    return replace(LogFiles(path, path.parent, layout, {path: table}).columns, said=said)
 
 
 def _undoubted(path: Path, table: LogTable) -> tuple[LogLayout, str]:
@@ -90,47 +88,18 @@ def layout_of(path: Path) -> LogLayout:
         return LogLayout()
 
 
-def standard_layout(path: Path, table: LogTable) -> LogLayout:
-    """Return the layout of a file whose columns are called as idbench calls them; raise LogError if they are not."""
-    names = [*table.columns, *table.words]
-    _require_names(path, table)
-    n = sum(bool(re.fullmatch(r"q\d+", name)) for name in names)
-    of_both = {name[1:] for name in names if name.startswith("q_")} & {name[3:] for name in names if name.startswith("tau_")}
-    mixed = [name for name in names if n and name.removeprefix("tau").removeprefix("q") in of_both]
-    if mixed:
-        numbered = next(name for name in names if re.fullmatch(r"q\d+", name))
-        raise LogError(
-            f"{path} numbers some joints ({numbered}) and names others ({', '.join(mixed)}): call all columns by numbers, "
-            "q1, q2, ..., or all by the names of their joints, or say what they are with --columns"
-        )
-    joints = () if n else tuple(name.removeprefix("q_") for name in names if name.startswith("q_"))
-    ends = [f"_{joint}" for joint in joints] or [str(j + 1) for j in range(max(n, 1))]
-    needed = ["t", *(f"q{end}" for end in ends), *(f"tau{end}" for end in ends)]
-    present = [name for name in names if re.fullmatch(r"t|(q|tau)_.+" if joints else r"t|(q|tau)\d+", name)]
-    missing, unexpected = [x for x in needed if x not in present], [x for x in present if x not in needed]
-    if missing or unexpected:
-        wrong = [f"{what} {', '.join(x)}" for what, x in (("missing:", missing), ("unexpected:", unexpected)) if x]
-        raise LogError(
-            f"{path} must have a header with the columns {', '.join(needed)}; {'; '.join(wrong)}; its columns: "
-            f"{', '.join(names[:SHOWN])}; or say what they are in a file log.toml beside it: uv run idbench log {path} --write "
-            "makes one to start from"
-        )
-    qd = tuple(f"qd{end}" for end in ends)
-    velocities = Source(qd) if set(qd) <= set(table.columns) else Source()
-    q, tau = (Source(tuple(f"{x}{end}" for end in ends)) for x in ("q", "tau"))
-    warm = tuple(f"temperature{end}" for end in ends)
-    every = warm if set(warm) <= set(table.columns) else ("temperature",) if "temperature" in table.columns else ()
-    return LogLayout(Source(("t",)), q, tau, velocities, joints, temperature=Source(every))
-
-
 @dataclass(frozen=True, eq=False)
-class _Files:
+class LogFiles:
     """The files of a log, read once each."""
 
     log: Path
+    """The log."""
     folder: Path
+    """Where its other files are."""
     layout: LogLayout
+    """What its columns are."""
     tables: dict[Path, LogTable] = None  # type: ignore[assignment]  # made below
+    """What files hold."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "tables", dict(self.tables or {}))
@@ -140,25 +109,48 @@ class _Files:
         """What they hold."""
         layout = self.layout
         self._require_once()
-        found = {name: self._of(name, getattr(layout, name)) for name in ("q", "tau", *(["qd"] if layout.qd.columns else []))}
+        kinds = [name for name in ("q", "qd", "tau") if name == "tau" or getattr(layout, name).columns]
+        if "q" not in kinds and "qd" not in kinds:
+            raise LogError(f"{self.log}: a layout must name columns of q, or of qd, which are then integrated")
+        found = {name: self.of(name, getattr(layout, name)) for name in kinds}
         names = layout.joints or next((joints for _, joints in found.values() if joints), ())
-        q, tau, *more = (self._ordered(name, *of, names) for name, of in found.items())
+        every = {name: self.ordered(name, *of, names) for name, of in found.items()}
+        tau, qd = every["tau"], every.get("qd")
+        if "q" not in every:
+            every["q"], qd = self._integrated(every["qd"]), None
+        q = every["q"]
         if q.shape[1] != tau.shape[1]:
             raise LogError(f"{self.log}: {q.shape[1]} columns of positions and {tau.shape[1]} of torques: one of each a joint")
         if names and len(names) != q.shape[1]:
             raise LogError(f"{self.log}: {len(names)} names of joints, {q.shape[1]} columns of positions")
-        qd = more[0] if more else None
-        t, t_tau = self._times(layout.q, len(q)), self._times(layout.tau, len(tau))
+        t, t_tau = self.times(layout.q if layout.q.columns else layout.qd, len(q)), self.times(layout.tau, len(tau))
         other = t_tau.shape != t.shape or not np.array_equal(t, t_tau)
         since = min((times[0] for times in (t, t_tau) if len(times)), default=0.0)
         start = since if other or abs(since) > CLOCKS else 0.0  # since 1970
+        missing = self._missing(tau)
+        tau = np.where(np.isin(np.arange(tau.shape[1]), missing), 0.0, tau)
         channel = layout.torque or self._stated()
         gain = np.broadcast_to(self._gain(tau.shape[1]), tau.shape[1:])
         tau = tau * gain
         q, tau, qd = self._of_joints(q, tau, qd)
-        warm = self._of("temperature", layout.temperature)[0] if layout.temperature.columns else None
+        warm = self.of("temperature", layout.temperature)[0] if layout.temperature.columns else None
         gains = tuple(map(float, gain))
-        return LogColumns(t - start, q, tau, channel, names, qd, t_tau - start if other else None, warm, gains)
+        own_times = t_tau - start if other else None
+        return LogColumns(t - start, q, tau, channel, names, qd, own_times, warm, gains, missing, "q" not in kinds)
+
+    def _integrated(self, qd: Array) -> Array:
+        """Return positions of velocities, from 0: q(k+1) = q(k) + (qd(k) + qd(k+1)) (t(k+1) - t(k)) / 2."""
+        steps = np.diff(self.times(self.layout.qd, len(qd)))[:, None]
+        return np.concatenate([np.zeros((1, qd.shape[1])), np.cumsum((qd[1:] + qd[:-1]) * steps / 2, axis=0)])
+
+    def _missing(self, tau: Array) -> tuple[int, ...]:
+        """Return the joints without any torque."""
+        none = np.flatnonzero(np.isnan(tau).all(axis=0))
+        if len(none) == tau.shape[1]:
+            raise LogError(f"{self.log}: no torque of it has a value")
+        if len(none) and self.layout.motors:
+            raise LogError(f"{self.log}: torques of some motors are not there, of which those of joints are made ([motors])")
+        return tuple(map(int, none))
 
     def _of_joints(self, q: Array, tau: Array, qd: Array | None) -> tuple[Array, Array, Array | None]:
         """Return positions, torques and velocities of joints, where those of motors were logged."""
@@ -170,7 +162,7 @@ class _Files:
         back = np.linalg.inv(M).T
         return q @ back, tau @ M, None if qd is None else qd @ back
 
-    def _ordered(self, quantity: str, values: Array, joints: tuple[str, ...], names: tuple[str, ...]) -> Array:
+    def ordered(self, quantity: str, values: Array, joints: tuple[str, ...], names: tuple[str, ...]) -> Array:
         """Return columns in the order of the joints' names, where they have names themselves."""
         if not joints or joints == names:
             return values
@@ -229,13 +221,16 @@ class _Files:
                 raise LogError(f"{path}: {name} is {value!r} in no row; it goes from {column.min()!s} to {column.max()!s}")
         return slice(None) if kept is None else kept
 
-    def _of(self, quantity: str, source: Source) -> tuple[Array, tuple[str, ...]]:
+    def of(self, quantity: str, source: Source) -> tuple[Array, tuple[str, ...]]:
         """Return the columns of a quantity in SI, shape (time, joint), and the names of joints that they have."""
         path = self._path(source)
         table = self._table(path)
         columns = list[Array]()
         joints = list[str]()
         for pattern in source.columns:
+            if pattern == UNLOGGED:
+                columns.append(np.full(table.rows, np.nan))
+                continue
             if pattern in table.columns or "*" not in pattern:
                 column = table.require(pattern, path)
                 columns += _singly(column)
@@ -258,7 +253,7 @@ class _Files:
             source: Source = getattr(self.layout, quantity)
             path = self._path(source)
             names = list(self._table(path).columns) if source.columns else []
-            for pattern in source.columns:
+            for pattern in source.logged:
                 for name in [pattern] if pattern in names or "*" not in pattern else [x for x, _ in matching(pattern, names)]:
                     if other := used.get((path, name)):
                         of = f"twice as {quantity}" if other == quantity else f"as {other} and as {quantity}"
@@ -268,7 +263,7 @@ class _Files:
                         )
                     used[path, name] = quantity
 
-    def _times(self, source: Source, count: int) -> Array:
+    def times(self, source: Source, count: int) -> Array:
         """Return the times of a quantity [s]."""
         clock = self.layout.t
         path = self._path(source) if source.t else self._path(clock)
@@ -284,15 +279,3 @@ class _Files:
 def _singly(column: Array) -> list[Array]:
     """Return the entries of a column as columns."""
     return [column] if column.ndim == 1 else list(column.T)
-
-
-def _require_names(path: Path, table: LogTable) -> None:
-    """Raise LogError if the columns of a file have no names."""
-    if table.named:
-        return
-    joints = max(1, (len(table.columns) - 1) // 2)
-    line = ",".join(["t", *(f"{x}{j + 1}" for x in ("q", "tau") for j in range(joints))])
-    raise LogError(
-        f"{path} has no header, its first line is numbers: put a line of names before it, such as {line}, or say what its "
-        f"columns are in a file log.toml beside it: uv run idbench log {path} --write makes one to start from"
-    )

@@ -17,8 +17,9 @@ Columns = tuple[dict[str, Array], dict[str, tuple[str, ...]]]
 def read_bag(path: Path) -> LogTable:
     """Return time, position, velocity and effort of the joints of a bag.
 
-    Joint states are taken, or the points of joint trajectories where there are no states. Where several topics have them, their
-    columns begin with the topic. Times are those in the headers of the messages, or of recording where the headers have none.
+    Joint states are taken, or the points of joint trajectories where there are no states. Where there are both, of one topic
+    each, trajectories are the column `command` beside the states. Where several topics have them, their columns begin with the
+    topic. Times are those in the headers of the messages, or of recording where the headers have none.
     """
     try:
         from rosbags.highlevel import AnyReader
@@ -33,17 +34,21 @@ def read_bag(path: Path) -> LogTable:
             if kind is None:
                 known = ", ".join(sorted(kinds)) or "none"
                 raise LogError(f"{path} holds no messages {' or '.join(KINDS)}; it holds {known}")
-            tables = {
-                c.topic: [(stamp, reader.deserialize(raw, c.msgtype)) for _, stamp, raw in reader.messages([c])]
+            every = {
+                (c.msgtype, c.topic): [(stamp, reader.deserialize(raw, c.msgtype)) for _, stamp, raw in reader.messages([c])]
                 for c in reader.connections
-                if c.msgtype == kind
+                if c.msgtype in KINDS
             }
     except LogError:
         raise
     except Exception as error:  # rosbags raises what its parsers do
         raise LogError(f"cannot read the log {path} as a ROS bag: {str(error).splitlines()[0]}") from error
+    tables = {topic: messages for (of, topic), messages in every.items() if of == kind}
+    others = [messages for (of, _), messages in every.items() if of != kind and messages]
     several = len(tables) > 1
     found = [KINDS[kind](path, messages, f"{topic}/" if several else "") for topic, messages in tables.items() if messages]
+    if len(found) == 1 and len(others) == 1:
+        found.append(_commands(path, next(messages for messages in tables.values() if messages), others[0]))
     return LogTable(
         {name: column for columns, _ in found for name, column in columns.items()},
         entries={name: joints for _, entries in found for name, joints in entries.items()},
@@ -70,6 +75,21 @@ def _of_trajectories(path: Path, messages: Sequence[tuple[int, Any]], before: st
     return _columns(before, joints, t, values)
 
 
+def _commands(path: Path, states: Sequence[tuple[int, Any]], messages: Sequence[tuple[int, Any]]) -> Columns:
+    """Return the positions that trajectories command at the times of joint states: held, or between points of a message."""
+    joints = _same_joints(path, [message.name for _, message in states])
+    named = _same_joints(path, [message.joint_names for _, message in messages])
+    if set(named) != set(joints):
+        raise LogError(f"{path}: trajectories are of {', '.join(named)}, states of {', '.join(joints)}")
+    t, starts = _absolute(states), _absolute(messages)
+    points = [(x, point) for x, (_, message) in zip(starts, messages, strict=True) for point in message.points]
+    at = np.array([x + _seconds(point.time_from_start) for x, point in points])
+    q = np.array([point.positions for _, point in points])[:, [named.index(name) for name in joints]]
+    if max(len(message.points) for _, message in messages) > 1:
+        return {"command": np.stack([np.interp(t, at, x) for x in q.T], axis=1)}, {"command": joints}
+    return {"command": q[np.maximum(np.searchsorted(at, t + 1e-9, side="right") - 1, 0)]}, {"command": joints}
+
+
 KINDS: dict[str, Callable[[Path, Sequence[tuple[int, Any]], str], Columns]] = {
     "sensor_msgs/msg/JointState": _of_states,
     "trajectory_msgs/msg/JointTrajectory": _of_trajectories,
@@ -90,10 +110,14 @@ def _seconds(stamp: Any) -> float:
 
 def _stamps(messages: Sequence[tuple[int, Any]]) -> Array:
     """Return times of messages [s] since the first: those of their headers, or of recording where these have none."""
-    stamps = np.array([_seconds(message.header.stamp) for _, message in messages])
-    if not stamps.any():
-        stamps = 1e-9 * np.array([stamp - messages[0][0] for stamp, _ in messages], dtype=np.float64)
+    stamps = _absolute(messages)
     return stamps - stamps[0]
+
+
+def _absolute(messages: Sequence[tuple[int, Any]]) -> Array:
+    """Return times of messages [s]: those of their headers, or of recording where these have none."""
+    stamps = np.array([_seconds(message.header.stamp) for _, message in messages])
+    return stamps if stamps.any() else 1e-9 * np.array([stamp for stamp, _ in messages], dtype=np.float64)
 
 
 def _columns(before: str, joints: tuple[str, ...], t: Array, values: dict[str, list[Sequence[float]]]) -> Columns:

@@ -1,128 +1,36 @@
 """Logs of servos on disk: t, q, command, and where they were logged whether torque is on and the supply voltage."""
 
-import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
-from fnmatch import fnmatchcase
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, final
+from typing import final
 
 import numpy as np
 
 from idbench.identify.arrays import Array
-from idbench.identify.errors import IdentificationError, LogError, SettingError
+from idbench.identify.errors import LogError, SettingError
 from idbench.identify.files.formats import read_table
-from idbench.identify.files.layout import matching
+from idbench.identify.files.guess import EPISODES
+from idbench.identify.files.guess_units import FARTHEST, unit_of_times
+from idbench.identify.files.layout import LogLayout, Source, matching
+from idbench.identify.files.lerobot import data_file, is_data_set
+from idbench.identify.files.reading import LogFiles
 from idbench.identify.files.table import LogTable, factor
-from idbench.identify.plugins import did_you_mean
-from idbench.identify.servo.closed_loop import PUBLISHED, Servo
 
-GAIN_UNITS = {"1/rad": 1.0, "1/deg": 180 / np.pi, "1/count": 0.0}
-"""Units of a gain, duty per unit of kp and of error, and what makes 1/rad of it; counts depend on the encoder."""
+USUAL: Mapping[str, tuple[str, ...]] = {
+    "t": ("t", "time", "timestamp"),
+    "q": ("q*", "position", "observation.state"),
+    "command": ("command*", "ctrl*", "action"),
+    "forward": ("forward*",),
+    "on": ("on*",),
+    "voltage": ("voltage*",),
+}
+"""How columns are called where nobody says otherwise; those of LeRobot last."""
 
-KEYS = ("model", "gain_unit", *(field.name for field in fields(Servo)))
-"""What a servo may state."""
+NAME_IT = "Name it: --columns command=NAME, a * in it for numbers or names of joints"
+"""The way out where a column is not found."""
 
-ROBOT = "robot"
-"""What a log may state beside: the robot, links and load, that it is of."""
-
-
-@final
-@dataclass(frozen=True)
-class ServoFile:
-    """What is known of the servos of a robot."""
-
-    stated: Mapping[str, Any]
-    """What holds for all joints."""
-    joints: Mapping[str, Mapping[str, Any]]
-    """What holds for one joint alone, by its name."""
-    logs: Mapping[str, Mapping[str, Any]]
-    """What holds for some logs alone, by the name of the file or a pattern (* for any letters): kp, or the robot that carried
-    another load."""
-    folder: Path = Path()
-    """Where the file is: robots of logs are named from there."""
-
-    @classmethod
-    def read(cls, path: Path) -> "ServoFile":
-        r"""Return what a file states; raise SettingError that names what is unknown or wrong in it.
-
-        Examples
-        --------
-        >>> import tempfile
-        >>> from pathlib import Path
-        >>> path = Path(tempfile.mkdtemp()) / "servo.toml"
-        >>> _ = path.write_text('model = "STS3215"\nsupply = 12.0\nkp = 16\n')
-        >>> ServoFile.read(path).servo("elbow", "log.csv").duty_limit
-        0.97
-        """
-        try:
-            stated = tomllib.loads(path.read_text(encoding="utf-8"))
-            joints, logs = stated.pop("joints", {}), stated.pop("logs", {})
-            made = cls(stated, joints, logs, path.absolute().parent)
-            for part in (stated, *joints.values(), *({k: x for k, x in each.items() if k != ROBOT} for each in logs.values())):
-                _require_known(part)
-            _require_names(logs)
-            made.servo("", "")
-        except OSError as error:
-            raise SettingError(f"cannot read {path}: {error.strerror or error}") from error
-        except (ValueError, TypeError, AttributeError, RecursionError) as error:  # ours are ValueErrors, too
-            raise SettingError(f"{path}: {error}") from error
-        return made
-
-    def servo(self, joint: str, log: str) -> Servo:
-        """Return the servo of a joint in a log."""
-        stated = {**self.stated, **self.joints.get(joint, {}), **self._of_log(log)}
-        stated.pop(ROBOT, None)
-        model, unit = stated.pop("model", None), stated.pop("gain_unit", "1/rad")
-        if model is not None:
-            if model not in PUBLISHED:
-                raise SettingError(f"model = {model!r} is unknown{did_you_mean(str(model), PUBLISHED)}; {_published()}")
-            stated = {**dict(zip(("gain", "duty_limit", "counts"), PUBLISHED[model], strict=True)), **stated}
-        if "gain" not in stated:
-            raise SettingError(f"gain is missing: the duty per unit of kp and rad, or a model that has it; {_published()}")
-        if unit not in GAIN_UNITS:
-            raise SettingError(f"gain_unit = {unit!r} is unknown; known: {', '.join(GAIN_UNITS)}")
-        counts = stated.get("counts", Servo.counts)
-        stated["gain"] *= GAIN_UNITS[unit] or counts / (2 * np.pi)
-        return Servo(**stated)
-
-    def robot(self, log: str) -> str | None:
-        """Return the robot that a log is of, if that is stated: its name, or the path of its file."""
-        name = self._of_log(log).get(ROBOT)
-        return str(self.folder / name) if name and (self.folder / name).exists() else name
-
-    def _of_log(self, log: str) -> dict[str, Any]:
-        """Return what is stated of a log; later patterns go before earlier ones."""
-        return {key: x for pattern, part in self.logs.items() if fnmatchcase(log, pattern) for key, x in part.items()}
-
-
-def _require_names(logs: Mapping[str, Mapping[str, Any]]) -> None:
-    for pattern, part in logs.items():
-        if ROBOT in part and not isinstance(part[ROBOT], str):
-            raise IdentificationError(f'[logs."{pattern}"]: robot = {part[ROBOT]!r} must be the name of a robot or of its file')
-
-
-def _require_known(part: Mapping[str, Any]) -> None:
-    for key, value in part.items():
-        if key not in KEYS:
-            raise IdentificationError(
-                f"key {key!r} is unknown{did_you_mean(key, KEYS)}; known: {', '.join(KEYS)}, joints, logs"
-            )
-        if key not in ("model", "gain_unit") and (isinstance(value, bool) or not isinstance(value, int | float)):
-            raise IdentificationError(f"{key} = {value!r} must be a number")
-
-
-def _published() -> str:
-    return f"published: {', '.join(PUBLISHED)}"
-
-
-QUANTITIES = {"t": "t", "q": "q", "command": "q", "on": "", "voltage": ""}
-"""What columns may be, and whose units they have."""
-
-PATTERNS = {"t": "t", "q": "q*", "command": "command*", "on": "on*", "voltage": "voltage*"}
-"""How they are called where nobody says otherwise."""
-
-OPTIONAL = ("on", "voltage")
+OPTIONAL = ("forward", "on", "voltage")
 
 
 @final
@@ -140,19 +48,28 @@ class ServoColumns:
     """Above 0.5 where torque is enabled, shape (time, joint)."""
     voltage: Array | None
     """Shape (time, joint) [V]."""
-    joints: tuple[str, ...]
+    joints: tuple[str, ...] = ()
     """Names of the joints, where the columns have them."""
+    commanded: tuple[str, ...] = ()
+    """Names of joints or actuators that are commanded, where the columns have them."""
+    forward: Array | None = None
+    """Commanded beside the angle: duty, torque [N m] or current [A], shape (time, joint)."""
 
 
-def read_servo_log(path: Path, columns: Mapping[str, str], units: Mapping[str, str]) -> ServoColumns:
-    """Return the columns of a log of servos.
+def read_servo_log(
+    path: Path, columns: Mapping[str, str], units: Mapping[str, str], rows: Mapping[str, float] | None = None
+) -> tuple[ServoColumns, str]:
+    """Return the columns of a log of servos, and what was assumed of them in words; empty if nothing was.
 
     Parameters
     ----------
     path : Path
-        CSV or other text, Parquet, NumPy, Matlab, a ROS bag.
+        CSV or other text, Parquet, a data set of LeRobot, NumPy, Matlab, a ROS bag.
     columns, units : mapping of str to str
-        Names of columns (a * stands for numbers or names of joints, or a list with commas) and units, by quantity.
+        Names of columns (a * stands for numbers or names of joints, or a list with commas) and units, by quantity; by default
+        what `log.toml` beside it says, or `USUAL` in SI units.
+    rows : mapping of str to float, optional
+        Only rows in which columns have these values: an episode.
 
     Raises
     ------
@@ -162,46 +79,114 @@ def read_servo_log(path: Path, columns: Mapping[str, str], units: Mapping[str, s
         If a quantity or a unit is unknown.
     """
     for quantity in (*columns, *units):
-        if quantity not in QUANTITIES:
-            raise SettingError(f"{quantity!r} is no quantity of a servo's log; known: {', '.join(QUANTITIES)}")
+        if quantity not in USUAL:
+            raise SettingError(f"{quantity!r} is no quantity of a servo's log; known: {', '.join(USUAL)}")
+    path = data_file(path) if is_data_set(path) else path
     table = read_table(path)
-    found = {name: _of(path, table, name, columns.get(name), units.get(name, "")) for name in QUANTITIES}
-    joints = found["q"][1] or found["command"][1]
-    t, q, command = (found[name][0] for name in ("t", "q", "command"))
+    beside = LogLayout.beside(path)
+    layout = _stated(path, table, beside[0] if beside else LogLayout(), columns, units, rows or {})
+    files = LogFiles(path, path.parent, layout, {path: table})
+    found = {name: files.of(name, of) for name in USUAL if name != "t" and (of := getattr(layout, name)).columns}
+    q, command = found["q"][0], found["command"][0]
+    if len(q) != len(command):
+        raise LogError(f"{path}: {len(q)} samples of positions and {len(command)} of commands: one of each at every time")
     if q.shape != command.shape:
         raise LogError(f"{path} has {q.shape[1]} columns of positions and {command.shape[1]} of commands: one of each a joint")
-    on, voltage = (
-        np.broadcast_to(found[name][0], q.shape) if found[name][0].shape[1] in (1, q.shape[1]) else None for name in OPTIONAL
+    t = files.times(layout.q, len(q))
+    _require_radians(path, layout, {"q": q, "command": command})
+    _require_complete(path, {"t": t, **{name: x for name, (x, _) in found.items()}})
+    _require_steady(path, table, t)
+    said = ""
+    if not layout.t.unit and (unit := unit_of_times(t)):
+        t, said = t * factor("t", unit), f"{path.name}: times in {unit}, by their size; --units t=s if they are in s"
+    forward, on, voltage = (
+        np.broadcast_to(found[name][0], q.shape) if name in found and found[name][0].shape[1] in (1, q.shape[1]) else None
+        for name in OPTIONAL
     )
-    return ServoColumns(t[:, 0], q, command, on, voltage, joints)
+    joints = layout.joints or found["q"][1] or found["command"][1]
+    return ServoColumns(t - t[0], q, command, on, voltage, joints, found["command"][1], forward), said
 
 
-def _of(path: Path, table: LogTable, quantity: str, stated: str | None, unit: str) -> tuple[Array, tuple[str, ...]]:
-    """Return the columns of a quantity in SI, shape (time, joint), and the names of joints that they have."""
-    names, columns = list(table.columns), list[Array]()
-    joints = list[str]()
-    for pattern in (stated or PATTERNS[quantity]).split(","):
-        plain = pattern.replace("*", "") if stated is None else pattern  # a log of one joint needs no number
-        inside = [(plain, "")] if plain in names else matching(pattern, names) if "*" in pattern else []
-        if not inside and not (stated is None and quantity in OPTIONAL):
+def _stated(
+    path: Path,
+    table: LogTable,
+    layout: LogLayout,
+    columns: Mapping[str, str],
+    units: Mapping[str, str],
+    rows: Mapping[str, float],
+) -> LogLayout:
+    """Return the layout that is stated, by options before the file beside the log before the usual names."""
+    every = [*table.columns, *table.words]
+    for name, usual in USUAL.items():
+        source: Source = getattr(layout, name)
+        if name in columns:
+            source = Source(tuple(columns[name].split(",")), source.unit)
+            if lacking := [x for x in source.columns if not _is_there((x,), every)]:
+                raise LogError(f"{path} has no column {lacking[0]} for {name}; its columns: {', '.join(every[:40])}. {NAME_IT}")
+        elif not _is_there(source.columns, every):
+            called = next((x for x in usual if _is_there((x,), every) or x.replace("*", "") in every), None)
+            if called is None and name not in OPTIONAL:
+                raise LogError(f"{path} has no column {usual[0]} for {name}; its columns: {', '.join(every[:40])}. {NAME_IT}")
+            plain = called is not None and "*" in called and called.replace("*", "") in every
+            source = Source((called.replace("*", "") if plain else called,) if called else (), source.unit)
+        if name in units:
+            factor(name, units[name])
+            source = replace(source, unit=units[name])
+        layout = layout.where(name, source)
+    return replace(layout, rows={**layout.rows, **rows})
+
+
+def _is_there(patterns: Sequence[str], names: Sequence[str]) -> bool:
+    return bool(patterns) and all(x in names or ("*" in x and matching(x, names)) for x in patterns)
+
+
+def _require_complete(path: Path, found: Mapping[str, Array]) -> None:
+    for name, values in found.items():
+        if wrong := np.flatnonzero(~np.isfinite(values.reshape(len(values), -1)).all(axis=1)).tolist():
+            raise LogError(f"{path}: {name} is missing at sample {wrong[0]}; remove or repair such samples first")
+
+
+def _require_radians(path: Path, layout: LogLayout, found: Mapping[str, Array]) -> None:
+    """Raise LogError if angles without a stated unit are those of several turns."""
+    for name, values in found.items():
+        if not getattr(layout, name).unit and (most := float(np.nanmax(np.abs(values)))) > FARTHEST:
             raise LogError(
-                f"{path} has no column {pattern} for {quantity}; its columns: {', '.join(names[:40])}. Name it: "
-                f"--columns {quantity}=NAME"
+                f"{path}: {name} reaches {most:.4g} rad: state its unit, --units q=deg command=deg, or q=rad if it is in rad; "
+                "angles in -100 to 100 of a calibrated range (LeRobot) have none: record with use_degrees=true"
             )
-        columns += [table.columns[name] for name, _ in inside]
-        joints += [place.removeprefix("_") for _, place in inside if place and not place.isdigit()]
-    if not columns:
-        return np.empty((0, 0)), ()
-    if any(column.ndim != 1 for column in columns):
-        raise LogError(f"{path}: columns of {quantity} must hold one number a row")
-    if wrong := [k for column in columns for k in np.flatnonzero(~np.isfinite(column))]:
-        raise LogError(f"{path}: {quantity} is missing at sample {wrong[0]}; remove or repair such samples first")
-    scale = factor(QUANTITIES[quantity], unit) if unit and QUANTITIES[quantity] else 1.0
-    return np.stack(columns, axis=1) * scale, tuple(joints) if len(joints) == len(columns) else ()
 
 
-def order(columns: ServoColumns, joints: Sequence[str], path: Path) -> list[int]:
-    """Return which column belongs to each of the joints; raise LogError if the log does not have them all."""
+def _require_steady(path: Path, table: LogTable, t: Array) -> None:
+    """Raise LogError if times begin again: several runs are in one file."""
+    if (np.diff(t) > 0).all():
+        return
+    episodes = [name for name in EPISODES if name in table.columns and len(np.unique(table.columns[name])) > 1]
+    if episodes:
+        first = float(table.columns[episodes[0]][0])
+        raise LogError(f"{path} holds several runs by {episodes[0]}: name one, --rows {episodes[0]}={first:g}")
+
+
+def ordered(columns: ServoColumns, joints: Sequence[str], actuators: Mapping[str, str], path: Path) -> ServoColumns:
+    """Return columns in the order of the joints; raise LogError if the log does not have them all.
+
+    Parameters
+    ----------
+    columns, path
+        A log.
+    joints : sequence of str
+        Joints of the robot.
+    actuators : mapping of str to str
+        Joints of the actuators by whose names commands may be called.
+    """
+    place = _order(columns, joints, path)
+    called = [actuators.get(name, name) for name in columns.commanded]
+    own = [called.index(joint) for joint in joints] if set(called) >= set(joints) else place
+    forward, on, voltage = (None if x is None else x[:, place] for x in (columns.forward, columns.on, columns.voltage))
+    return ServoColumns(columns.t, columns.q[:, place], columns.command[:, own], on, voltage, tuple(joints), (), forward)
+
+
+def _order(columns: ServoColumns, joints: Sequence[str], path: Path) -> list[int]:
+    """Return which column belongs to each of the joints."""
     if columns.joints:
         if missing := [joint for joint in joints if joint not in columns.joints]:
             raise LogError(f"{path} names the joints {', '.join(columns.joints)}; the robot's {', '.join(missing)} is missing")

@@ -34,10 +34,30 @@ TORQUES = {
 }
 """Those that are no torques need a gain beside them."""
 
-UNITS = {"t": TIMES, "q": POSITIONS, "qd": VELOCITIES, "tau": TORQUES, "temperature": {"degC": 1.0}}
+UNITS: Mapping[str, Mapping[str, float]] = {
+    "t": TIMES,
+    "q": POSITIONS,
+    "qd": VELOCITIES,
+    "tau": TORQUES,
+    "temperature": {"degC": 1.0},
+    "command": POSITIONS,
+    "forward": TORQUES,
+    "on": {"1": 1.0},
+    "voltage": {"V": 1.0, "mV": 1e-3},
+}
 """Units of each quantity of a log."""
 
-SI = {"t": "s", "q": "rad", "qd": "rad/s", "tau": "N m", "temperature": "degC"}
+SI = {
+    "t": "s",
+    "q": "rad",
+    "qd": "rad/s",
+    "tau": "N m",
+    "temperature": "degC",
+    "command": "rad",
+    "forward": "N m",
+    "on": "1",
+    "voltage": "V",
+}
 """Units that are taken where a file states none; those of slides are m and N, which are of the same size."""
 
 NEED_GAIN = ("A", "mA", "%")

@@ -12,6 +12,7 @@ from idbench.identify.data.motion_log import MotionLog
 from idbench.identify.estimators.problem import Problem
 from idbench.identify.rows.rows import Rows
 from idbench.identify.signals.masks import slow_speed
+from idbench.identify.signals.spectra import welch
 
 BANDS = np.array([1.0, 2.0, 3.0, 4.0])
 """Ends of the bands of speeds that are looked at, in multiples of what the mask takes: a fifth of the rms speed at most."""
@@ -75,7 +76,7 @@ def _wrong(some: Array, fast: Array) -> bool:
     if len(some) < 2 or len(fast) < 2 * len(BANDS) or not fast.any():
         return False
     ratio = float(np.mean(some**2) / np.mean(fast**2))
-    return ratio > EXCESS**2 and float(scipy.stats.f.sf(ratio, INDEPENDENT * len(some), INDEPENDENT * len(fast))) < CERTAIN
+    return ratio > EXCESS**2 and float(scipy.special.fdtrc(INDEPENDENT * len(some), INDEPENDENT * len(fast), ratio)) < CERTAIN
 
 
 ENOUGH = 4
@@ -111,20 +112,25 @@ class Band:
     def of(cls, logs: Sequence[MotionLog], parameters: int, least: float) -> "Band":
         """Return the band for logs of so many parameters: `least` [Hz], or more where that leaves too few rows.
 
-        Rows come at twice the cut-off: T seconds make 2 T f instants, and a power model has one row per instant. A short, fast
-        log starves at 5 Hz. Above twice the frequency at which the torques are noise there is nothing: power is a product.
+        It is less where logs are slow. Rows come at twice the cut-off: T seconds make 2 T f instants, and a power model has one
+        row per instant. A short, fast log starves at 5 Hz. Above twice the frequency at which the torques are noise there is
+        nothing: power is a product.
         """
         T = sum(log.samples / log.fs for log in logs)
         content = max(content_end(log) for log in logs)
         wanted = ENOUGH * parameters / (2 * T)
         most = min(OF_NYQUIST * log.fs / 2 for log in logs)
         cutoff = max(min(max(wanted, least), max(2 * content, least)), least)
-        cutoff = float(f"{min(cutoff, max(most, least)):.2g}")
+        cutoff = float(f"{min(cutoff, most):.2g}")
         return cls(cutoff, 2 * T * cutoff, wanted, content)
 
     def words(self, parameters: int, least: float) -> str:
         """Return what was chosen, and why; nothing where the default serves."""
-        if self.cutoff <= least:
+        if self.cutoff < least:
+            return (
+                f"band up to {self.cutoff:.2g} Hz instead of {least:g}, since the log is sampled slowly (--cutoff says another)"
+            )
+        if self.cutoff == least:
             return ""
         few = self.rows * least / self.cutoff
         enough = f"{self.rows:.0f} instants for {parameters} parameters, where {least:g} Hz leave {few:.0f}"
@@ -135,10 +141,10 @@ class Band:
 def content_end(log: MotionLog) -> float:
     """Return the frequency [Hz] above which no torque of a log stands out of its noise."""
     tau = log.tau.reshape(-1, log.samples, log.n)[0]
-    f, power = scipy.signal.welch(tau, log.fs, nperseg=min(log.samples, round(SEGMENT * log.fs)), axis=0)
+    f, power = welch(tau.T, log.fs, min(log.samples, round(SEGMENT * log.fs)))
     low, high = (share * log.fs / 2 for share in FLOOR)
-    floor = np.median(power[(f > low) & (f < high)], axis=0)
-    return max(_end(f, p, x) for p, x in zip(power.T, floor, strict=True))
+    floor = np.median(power[:, (f > low) & (f < high)], axis=1)
+    return max(_end(f, p, x) for p, x in zip(power, floor, strict=True))
 
 
 def _end(f: Array, power: Array, floor: float) -> float:

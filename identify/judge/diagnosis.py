@@ -1,10 +1,13 @@
-"""What is wrong with a fit: large mistakes, small ones, and torques that were not logged."""
+"""What is wrong with a fit: large mistakes and small ones; and which torques were not logged."""
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
+import scipy
 
-from idbench.identify.arrays import Array
+from idbench.identify.arrays import TINY, Array
+from idbench.identify.basis.block import Kind
 from idbench.identify.data.motion_log import MotionLog
 from idbench.identify.estimators.problem import Problem
 from idbench.identify.judge.small_mistakes import small_mistakes
@@ -14,6 +17,9 @@ from idbench.identify.judge.whole_mistakes import whole_mistake
 BALANCED, KNOWN = 0.1, 4.0
 """Share of its terms that a joint without a drive has as residual at most: what balances, balances to its noise; and sigma of
 parameters that count for that: those of a joint whose torque was not logged vanish."""
+
+DRIVING: tuple[Kind, ...] = ("viscous friction", "Coulomb friction")
+"""Kinds of friction that are both negative where a torque has the other sign; one may be by a wrong delay."""
 
 MOVES = 100.0
 """Standard deviations of the noise of a position beyond which a joint moves, and does not flicker by a count."""
@@ -33,11 +39,28 @@ def diagnosed(problem: Problem, X: Array) -> tuple[Suspect, ...]:
         Its estimate.
     """
     problem.require_rows("mistakes are looked for by rows, and ")
-    if (silent := _silent(problem.explicit, X)) is not None:
-        return (silent,)
     small = small_mistakes(problem, X)
     whole = whole_mistake(_thinned(problem.explicit), small[0] if small else None)
-    return (whole,) if whole else small
+    if whole and small and (whole.cause, whole.joint) == (small[0].cause, small[0].joint):
+        small, whole = (whole, *small[1:]), None
+    return (whole,) if whole else (*_driven_by_friction(problem.explicit, X), *small)
+
+
+def _driven_by_friction(problem: Problem, X: Array) -> Iterator[Suspect]:
+    """Yield joints whose friction would drive them: their torque has the other sign, which their residuals need not show.
+
+    Where others feel little of a joint, all of its parameters change their sign with its torque.
+    """
+    factor = problem.factors.fit(2).factor
+    sigma = np.sqrt(np.diagonal(factor.inverse(np.array(factor.determined))))
+    of_kind = {(p.kind, p.joint): k for k, p in enumerate(problem.basis.parameters)}
+    for j in range(problem.basis.n):
+        places = [of_kind.get((kind, j)) for kind in DRIVING]
+        t = [0.0 if k is None else float(X[k] / max(sigma[k], TINY)) for k in places]
+        if max(t) < -KNOWN:
+            yield Suspect(
+                "sign", "torque", j, (-1.0,), (0.0,), "1", float(scipy.special.ndtr(max(t))), -max(t), (), (0.0, 0.0), 0.0
+            )
 
 
 def _thinned(problem: Problem) -> Problem:
@@ -58,19 +81,43 @@ def _with_fewer(log: MotionLog, every: int) -> MotionLog:
     )
 
 
-def _silent(problem: Problem, X: Array) -> Suspect | None:
+def silent_joint(problem: Problem, X: Array) -> Suspect | None:
     """Return that the torque of the first joint whose torque never changes though it moves was not logged.
 
     A joint without a drive has none: inertia and weight balance in it, where parameters of one that has vanish.
+
+    Parameters
+    ----------
+    problem : Problem
+        The explicit model of one run, whose rows are kept.
+    X : Array, shape (p,)
+        Its estimate.
     """
-    rows, factor = problem.rows, problem.factors.fit(2).factor
+    if not (still := still_joints(problem)):
+        return None
+    factor = problem.factors.fit(2).factor
     sigma = np.sqrt(np.diagonal(factor.inverse(np.array(factor.determined))))
     known = np.where(np.abs(X) > KNOWN * sigma, X, 0.0)
-    still = np.all([np.ptp(log.tau, axis=-2) == 0 for log in problem.logs], axis=0)
-    moves = np.any([np.ptp(log.q, axis=-2) > MOVES * problem.position_noise for log in problem.logs], axis=0)
-    for j in map(int, np.flatnonzero(still & moves)):
-        own = rows.group == j
-        terms, left = np.sum((rows.W[own] * known) ** 2), np.sum((rows.Y - rows.predicted(X))[own] ** 2)
+    for j in still:
+        terms, left = 0.0, 0.0
+        for log, part in zip(problem.logs, problem.parts, strict=True):
+            if j in log.unchanging:
+                rows = part.rows
+                own = rows.group == j
+                terms += np.sum((rows.W[own] * known) ** 2)
+                left += np.sum((rows.Y - rows.predicted(X))[own] ** 2)
         if left >= BALANCED**2 * terms:
-            return Suspect("missing_torque", "torque", j, (1.0,), (0.0,), "1", 0.0, np.inf, (), (100.0, 0.0), np.inf)
+            return unlogged(j)
     return None
+
+
+def unlogged(j: int) -> Suspect:
+    """Return that the torque of a joint was not logged."""
+    return Suspect("missing_torque", "torque", j, (1.0,), (0.0,), "1", 0.0, np.inf, (), (100.0, 0.0), np.inf)
+
+
+def still_joints(problem: Problem) -> list[int]:
+    """Return the joints that move in a log in which their torque never changes."""
+    least = MOVES * problem.position_noise
+    moves = [np.max(np.ptp(log.q, axis=-2) > least, axis=tuple(range(log.q.ndim - 2))) for log in problem.logs]
+    return sorted({j for log, own in zip(problem.logs, moves, strict=True) for j in log.unchanging if own[j]})

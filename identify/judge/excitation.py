@@ -105,7 +105,7 @@ def noise_in_rows(estimate: Estimate) -> NoiseInRows:
     told = values > TELLING * values[..., -1:]
     statistic = np.sum(np.where(told, along**2 / np.where(told, values, 1.0), 0.0), axis=-1)
     freedom = np.sum(told, axis=-1)
-    probability = scipy.stats.chi2.sf(statistic, np.maximum(freedom, 1))
+    probability = scipy.special.chdtrc(np.maximum(freedom, 1), statistic)
     best = np.where(estimate.standard_errors > 0, estimate.standard_errors, 1.0)
     return NoiseInRows(statistic, freedom, probability, (plain.X - estimate.X) / best)
 

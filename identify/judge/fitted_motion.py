@@ -6,13 +6,19 @@ from functools import cached_property
 from typing import final
 
 import numpy as np
+import scipy
 
-from idbench.identify.arrays import Array, combined
+from idbench.identify.arrays import TINY, Array, combined
 from idbench.identify.basis.basis import Basis
 from idbench.identify.basis.block import RIGID
+from idbench.identify.basis.friction.laws import Cogging
+from idbench.identify.basis.of_joints import OfJoints
 from idbench.identify.basis.tree_links import TreeLinks
 from idbench.identify.data.kinematics import KinematicTree
 from idbench.identify.signals.signals import State
+
+SETTLING = 0.2
+"""Time over which loads are averaged that teeth of gears carry [s]: a period of the usual band."""
 
 SMALL = 1e-4
 """Step of differences [rad, m, 1], small beside what robots move, large beside rounding."""
@@ -31,6 +37,8 @@ class FittedMotion:
     """Its motion, shape (joint, time)."""
     t: Array
     """Instants [s], shape (time,)."""
+    poses: bool = False
+    """Whether they are poses at rest."""
 
     @property
     def n(self) -> int:
@@ -54,22 +62,38 @@ class FittedMotion:
         return self._of(*self.rigid, self.state)
 
     @cached_property
+    def carried(self) -> Array:
+        """What the teeth of gears carry, y = b * (b * load), b a box of `SETTLING`, shape (joint, time).
+
+        Without what steps of a position make of accelerations; measured torques have the noise that they would explain.
+        """
+        width = max(1, round(SETTLING * (len(self.t) - 1) / max(float(np.ptp(self.t)), TINY)))
+        once = scipy.ndimage.uniform_filter1d(self.load, width, axis=-1, mode="nearest")
+        return np.asarray(scipy.ndimage.uniform_filter1d(once, width, axis=-1, mode="nearest"))
+
+    @cached_property
     def rates(self) -> tuple[Array, Array]:
         """First and second time derivative of the load, shape (joint, time)."""
-        first = np.gradient(self.load, self.t, axis=-1)
-        return first, np.gradient(first, self.t, axis=-1)
+        first = self.rate(self.load)
+        return first, self.rate(first)
+
+    def rate(self, x: Array) -> Array:
+        """Return the time derivative of a signal, shape (..., time); 0 of poses at rest."""
+        return np.zeros_like(x) if self.poses else np.asarray(np.gradient(x, self.t, axis=-1))
 
     def moved(self, j: int, x: Array, xd: Array, xdd: Array) -> Array:
         """Return the derivative of the torque by a motion of joint j, x with its derivatives, shape (joint, time)."""
-        size = SMALL / max(float(np.abs(x).max()), 1e-12)
-        return np.asarray((self.at(j, size * x, size * xd, size * xdd) - self.load) / size)
+        return np.asarray(sum(slopes[j] * change for slopes, change in zip(self._slopes, (x, xd, xdd), strict=True)))
 
-    def at(self, j: int, x: Array, xd: Array, xdd: Array) -> Array:
-        """Return the torque of links and rotors with joint j moved by x, with its derivatives, shape (joint, time)."""
-        q, qd, qdd = (np.array(each) for each in (self.state.q, self.state.qd, self.state.qdd))
-        for each, change in ((q, x), (qd, xd), (qdd, xdd)):
-            each[j] += change
-        return self._of(*self.rigid, _state(q, qd, qdd))
+    @cached_property
+    def _slopes(self) -> Array:
+        """Derivatives of the load by position, velocity and acceleration of each joint, shape (3, joint moved, joint, time)."""
+        motion = np.stack([self.state.q, self.state.qd, self.state.qdd])
+        steps = np.eye(3 * self.n).reshape(3, self.n, 3, self.n, 1) * SMALL
+        every = np.moveaxis(motion + steps, (0, 1), (2, 3))  # all at once, one after the other in time
+        q, qd, qdd = every.reshape(3, self.n, -1)
+        load = self._of(*self.rigid, _state(q, qd, qdd)).reshape(self.n, 3, self.n, -1)
+        return np.moveaxis((load - self.load[:, None, None]) / SMALL, 0, 2)
 
     def faster(self) -> Array:
         """Return the derivative of the torque by the rate of the clock: qd (1 + h), qdd (1 + 2 h)."""
@@ -84,6 +108,11 @@ class FittedMotion:
         basis, X = self.rigid
         return np.asarray((self._of(on_tree(basis, changed(self.tree)), X, self.state) - self.load) / SMALL)
 
+    @property
+    def reach(self) -> float:
+        """The largest distance from joint to joint [m]; 0 if it has no tree."""
+        return max((float(np.linalg.norm(joint.position)) for joint in self.tree.joints[1:]), default=0.0) if self.tree else 0.0
+
     @cached_property
     def tree(self) -> KinematicTree | None:
         """Of the links, if they are those of a tree."""
@@ -97,7 +126,10 @@ class FittedMotion:
         return np.asarray((more - rest) / h)
 
     def _of(self, basis: Basis, X: Array, state: State) -> Array:
-        return combined(basis.explicit(replace(state, conditions=self.state.conditions)), X, np.zeros(state.q.shape))
+        """Return the torque of a state, of which the motion may be a part that is repeated."""
+        times = state.q.shape[-1] // len(self.t)
+        conditions = {name: np.tile(x, times) for name, x in self.state.conditions.items()}
+        return combined(basis.explicit(replace(state, conditions=conditions)), X, np.zeros(state.q.shape))
 
 
 def tree_of(basis: Basis) -> KinematicTree | None:
@@ -109,6 +141,15 @@ def on_tree(basis: Basis, tree: KinematicTree) -> Basis:
     """Return a basis whose links are those of another tree."""
     blocks = tuple(replace(block, tree=tree) if isinstance(block, TreeLinks) else block for block in basis.blocks)
     return replace(basis, blocks=blocks)
+
+
+def carrying(basis: Basis) -> Basis:
+    """Return a basis with what gravity across the axis of the first joint makes of its link: its own first moments."""
+    there = {(p.kind, p.joint) for p in basis.parameters}
+    one_wave = OfJoints(Cogging(1.0), (0,))
+    if ("first moment", 0) in there or set(one_wave.parameters(basis.n)) & set(basis.parameters):
+        return basis
+    return basis + one_wave
 
 
 def _state(q: Array, qd: Array, qdd: Array) -> State:

@@ -4,7 +4,6 @@ from dataclasses import dataclass, replace
 from typing import final
 
 import numpy as np
-import scipy
 
 from idbench.identify.arrays import Array
 from idbench.identify.data.motion_log import MotionLog
@@ -16,6 +15,7 @@ from idbench.identify.rows.chain import Chain
 from idbench.identify.rows.row_map import RowMap
 from idbench.identify.signals.masks import AbstractMask, NoMask, ReversalMask
 from idbench.identify.signals.signals import Signals
+from idbench.identify.signals.spectra import gain_of, welch
 
 FEW = 0.1
 """Share of the sum of an operator's weights, by size, that their sum must be for rows to say what a constant becomes."""
@@ -93,16 +93,16 @@ def row_noise(left: Instants, signals: Signals, chain: Chain) -> Array:
     """
     log, fs = signals.log, signals.fs
     length = min(left.residual.shape[-1], round(fs / RESOLUTION))
-    f, S = scipy.signal.welch(left.residual * left.weight, fs, nperseg=length, detrend="constant")
+    f, S = welch(left.residual * left.weight, fs, length)
     S = S / np.maximum(np.mean(left.weight**2, axis=-1, keepdims=True), 1e-300)
-    passed = _gain(chain.operator.response(fs), f, fs)
-    kinds = np.stack([_gain(impulse, f, fs) ** 2 for impulse in _impulses(log, chain)])
+    passed = gain_of(chain.operator.response(fs), f, fs)
+    kinds = np.stack([gain_of(impulse, f, fs) ** 2 for impulse in _impulses(log, chain)])
     above = (passed < QUIET * passed[0]) & (f > f[np.argmax(passed < QUIET * passed[0])]) & (f < 0.95 * fs / 2)
     above &= (kinds > FAINT * kinds.max(axis=1, keepdims=True)).any(axis=0)
     if np.count_nonzero(above) < MIN_FREQUENCIES:
         return np.full(len(S), np.nan)
     levels = np.stack(two_levels(kinds[0, above], kinds[1, above], S[:, above]), axis=-1)
-    return np.sqrt(scipy.integrate.trapezoid(levels @ kinds * passed**2, f, axis=-1))
+    return np.sqrt(np.trapezoid(levels @ kinds * passed**2, f, axis=-1))
 
 
 def _impulses(log: MotionLog, chain: Chain) -> tuple[Array, Array]:
@@ -113,9 +113,3 @@ def _impulses(log: MotionLog, chain: Chain) -> tuple[Array, Array]:
     x = chain.prefilter.apply(x, fs)
     position = chain.differentiator.derivative(chain.differentiator.derivative(x, fs), fs)
     return chain.alignment.align(x[None], replace(log.torque, lags=()), fs).mean[0], position
-
-
-def _gain(impulse: Array, f: Array, fs: float) -> Array:
-    """Return the size of the frequency response of an impulse response."""
-    _, response = scipy.signal.freqz(impulse, worN=f, fs=fs)
-    return np.abs(response)

@@ -1,7 +1,8 @@
 """The rows that mistakes would leave unexplained: columns through mask and operator, as those of parameters."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import final
 
 import numpy as np
@@ -10,6 +11,7 @@ from idbench.identify.arrays import Array
 from idbench.identify.basis.basis import Basis
 from idbench.identify.estimators.log_rows import LogRows
 from idbench.identify.judge.fitted_motion import FittedMotion
+from idbench.identify.judge.mistake_columns import Rows
 from idbench.identify.judge.mistakes import (
     BASE,
     COLLISION,
@@ -18,7 +20,6 @@ from idbench.identify.judge.mistakes import (
     OF_JOINTS,
     OF_ROBOT,
     Mistake,
-    Rows,
 )
 from idbench.identify.signals.signals import State
 
@@ -146,6 +147,23 @@ class MistakeRows:
         ends = np.cumsum([0.0, *(part.rows.time[-1] for part in self.parts)])
         return np.concatenate([part.rows.time + end for part, end in zip(self.parts, ends, strict=False)])
 
+    def most(self, candidate: Candidate) -> float:
+        """Return the size above which a mistake is not small."""
+        most = candidate.mistake.most
+        return most * self._reach if candidate.mistake.cause == "length" else most
+
+    @cached_property
+    def _reach(self) -> float:
+        return FittedMotion(self.basis, self.X, self.parts[0].signals.state, np.zeros(1)).reach
+
+    def place(self, instant: float | None) -> tuple[float | None, int | None]:
+        """Return an instant of `_time` as one of its log [s], and which of several that is, from 0."""
+        if instant is None or len(self.parts) == 1:
+            return instant, None
+        ends = np.cumsum([0.0, *(part.rows.time[-1] for part in self.parts)])
+        k = int(np.clip(np.searchsorted(ends, instant) - 1, 0, len(self.parts) - 1))
+        return instant - float(ends[k]), k
+
     def _from_instants(self, c: Candidate) -> Iterator[Candidate]:
         time = self._time
         for instant in np.linspace(time[0], time[-1], INSTANTS + 1)[1:-1]:
@@ -163,12 +181,15 @@ class MistakeRows:
             if any(np.any(x) for columns in each for x in columns):
                 yield self._candidate(mistake, joint, np.concatenate([np.stack(columns, axis=-1) for columns in each]))
 
+    def _motion(self, part: LogRows) -> tuple[FittedMotion, int]:
+        """Return the fitted motion of a log at some of its samples, one of how many."""
+        cutoff = getattr(part.problem.own_chain.operator, "cutoff", None) or USUAL
+        thin = max(1, int(part.signals.fs / (RATE * cutoff)))
+        return _thinned(part, self.basis, self.X, thin), thin
+
     def _of_part(self, part: LogRows, asked: Iterable[tuple[Mistake, int | None]]) -> list[list[Array]]:
         """Return the rows of each column of mistakes."""
-        signals = part.signals
-        cutoff = getattr(part.problem.own_chain.operator, "cutoff", None) or USUAL
-        thin = max(1, int(signals.fs / (RATE * cutoff)))
-        motion = _thinned(part, self.basis, self.X, thin)
+        motion, thin = self._motion(part)
         columns = [each if isinstance(each := m.columns(motion, j or 0), tuple) else (each,) for m, j in asked]
         made = _filtered(part, [rows for each in columns for rows in each], motion.t, thin)
         return [[next(made) for _ in each] for each in columns]
@@ -184,7 +205,17 @@ def _thinned(part: LogRows, basis: Basis, X: Array, thin: int) -> FittedMotion:
     state = part.signals.state
     q, qd, qdd = (np.ascontiguousarray(x[..., ::thin]) for x in (state.q, state.qd, state.qdd))
     conditions = {name: x[..., ::thin] for name, x in state.conditions.items()}
-    return FittedMotion(basis, X, State(q, qd, lambda _: qdd, conditions), np.arange(q.shape[-1]) * thin / part.signals.fs)
+    return FittedMotion(
+        basis,
+        X,
+        _state(q, qd, qdd, conditions),
+        np.arange(q.shape[-1]) * thin / part.signals.fs,
+        part.signals.log.poses,
+    )
+
+
+def _state(q: Array, qd: Array, qdd: Array, conditions: Mapping[str, Array]) -> State:
+    return State(q, qd, lambda _: qdd, conditions)
 
 
 def _filtered(part: LogRows, columns: Sequence[Rows], t: Array, thin: int) -> Iterator[Array]:

@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-import scipy
 
 from idbench.identify.arrays import Array
 from idbench.identify.basis.basis import Basis
@@ -15,6 +14,7 @@ from idbench.identify.noise.propagation import NoiseLevels
 from idbench.identify.rows.chain import Chain
 from idbench.identify.rows.row_map import Kernel
 from idbench.identify.signals.signals import Signals, State
+from idbench.identify.signals.spectra import gain_of, welch
 
 EVERY = 50.0
 """Frequency of the instants over which the robot's slopes are averaged [Hz]."""
@@ -41,7 +41,7 @@ def noise_spectra(problem: Problem, levels: NoiseLevels, f: Array) -> tuple[Arra
     impulse[len(impulse) // 2] = 1.0
     zero = np.zeros_like(impulse)
     aligned, plain, rate, twice = (
-        np.abs(scipy.signal.freqz(h, worN=f, fs=fs)[1])
+        gain_of(h, f, fs)
         for h in (
             signals.torque_adjoint(impulse),
             signals.position_adjoint((impulse, zero, zero)),
@@ -155,7 +155,7 @@ def spectrum(y: Array, fs: float, resolution: float) -> tuple[Array, Array]:
     resolution : float
         Distance of the frequencies [Hz]; wider if `y` is shorter than its inverse.
     """
-    f, density = scipy.signal.welch(y, fs, nperseg=min(len(y), round(fs / resolution)), detrend="constant")
+    f, density = welch(y, fs, min(len(y), round(fs / resolution)))
     return f, np.sqrt(density)
 
 

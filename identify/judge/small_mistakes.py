@@ -10,6 +10,7 @@ import scipy
 from idbench.identify.arrays import TINY, Array
 from idbench.identify.errors import IdentificationError
 from idbench.identify.estimators.problem import Problem
+from idbench.identify.judge.lateness import torque_lateness
 from idbench.identify.judge.mistake_rows import Candidate, MistakeRows, held_torque
 from idbench.identify.judge.mistakes import COLLISION, GAIN
 from idbench.identify.judge.stretches import errors_of_stretches, scatter_of_sums
@@ -23,11 +24,14 @@ CERTAIN = 1e-6
 """Probability that any of all mistakes seems as significant by chance, below which one is suspected. Counts of encoders are not
 Gaussian: with 1e-3, 5 of 120 logs without a fault, of four robots, have a suspect, all with 12 bits."""
 
-WORTH, MATTERS = 0.99, 0.02
+WORTH, MATTERS = 0.98, 0.02
 """Share of an error on stretches that were not fitted that a mistake may leave, and error [%] below which none matters: a chain
 has errors of its own, of some 1e-5 %, and no drive is known to a fiftieth of a per cent."""
 
-ALIKE = 0.9
+PUSHED = 0.02
+"""Torque of a push, over the rms of the joint's, above which it is one: less is what any model leaves somewhere."""
+
+ALIKE = 0.8
 """Share of what a mistake explains that another one must explain to be its alternative."""
 
 MOST = 3
@@ -135,8 +139,14 @@ class _Search:
             # What happened once cannot be predicted; without it, the rest is.
             j = int(np.argmax(np.log(before) - np.log(after)))
             better = np.sum(np.log(after)) < np.sum(np.log(before)) and max(after[j], MATTERS) < WORTH * before[j]
-            if better or (one.candidate.mistake is COLLISION and before.max() > MATTERS):
+            if better or (one.candidate.mistake is COLLISION and self._pushes(one, float(before.max()))):
                 yield one, (float(before[j]), float(after[j]))
+
+    def _pushes(self, one: _Tested, before: float) -> bool:
+        """Return whether a push is large beside the torque of its joint: what happens once cannot be predicted."""
+        rows = self.problem.rows
+        level = float(np.sqrt(np.mean(rows.Y[(rows.group == one.candidate.joint) & rows.valid] ** 2)))
+        return before > MATTERS and bool(np.abs(one.size).max() > PUSHED * level)
 
     @cached_property
     def _known(self) -> int:
@@ -185,7 +195,7 @@ class _Search:
         chi2 = float(b @ np.linalg.solve(V, b))
         sizes, sigma = np.zeros((2, len(size)))
         sizes[shown], sigma[shown] = turn @ b, np.sqrt(np.sum((turn @ V) * turn, axis=1))
-        if (candidate.mistake.positive and sizes.min() < 0) or np.abs(sizes).max() > candidate.mistake.most:
+        if (candidate.mistake.positive and sizes.min() < 0) or np.abs(sizes).max() > self.rows.most(candidate):
             return None
         return _Tested(candidate, U[:own], sizes, sigma, U[:own] @ b, chi2, gain, of_all)
 
@@ -238,7 +248,7 @@ class _Search:
             candidate.mistake.cause,
             candidate.mistake.of,
             candidate.joint,
-            (self._torque_gain(candidate.joint or 0),) if candidate.mistake is GAIN else tuple(best.size.tolist()),
+            self._size_of(best),
             tuple(best.sigma.tolist()),
             candidate.mistake.unit,
             p,
@@ -247,13 +257,31 @@ class _Search:
             errors,
             best.gain,
             candidate.mistake.setting,
-            candidate.instant,
+            *self.rows.place(candidate.instant),
+            candidate.plain @ best.size - self._plain @ self._absorbed(candidate.white @ best.size),
         )
+
+    def _size_of(self, best: _Tested) -> tuple[float, ...]:
+        """Return the size of a mistake, iterated where that is large beside what its column is linear in."""
+        mistake, joint = best.candidate.mistake, best.candidate.joint
+        if mistake is GAIN:
+            return (self._torque_gain(joint or 0),)
+        if (mistake.cause, mistake.of) == ("delay", "torque") and joint is not None:
+            return (torque_lateness(self.problem, joint, float(best.size[0])),)
+        return tuple(best.size.tolist())
+
+    def _absorbed(self, white: Array) -> Array:
+        """Return the parameters that explain as much of a column as they can, shape (p,)."""
+        return np.asarray(np.linalg.lstsq(self._W, self._padded(white[:, None]))[0][:, 0])
+
+    @cached_property
+    def _plain(self) -> Array:
+        return np.concatenate([part.rows.W for part in self.problem.parts])
 
     def _held_out(self, more: Sequence[Candidate]) -> Array:
         """Return the errors of each joint on stretches that were not fitted [% of its torque], shape (joint,)."""
         white = np.concatenate([self._W, *(self._padded(c.white) for c in more)], axis=1)
-        plain = np.concatenate([np.concatenate([part.rows.W for part in self.problem.parts]), *(c.plain for c in more)], axis=1)
+        plain = np.concatenate([self._plain, *(c.plain for c in more)], axis=1)
         return errors_of_stretches(self.problem, white, self._Y, plain)
 
 

@@ -6,6 +6,7 @@ from idbench.identify.arrays import TINY, Array
 from idbench.identify.estimators.log_rows import LogRows
 from idbench.identify.estimators.model_error import MEMORY
 from idbench.identify.estimators.problem import Problem
+from idbench.identify.rows.factors import CONVERGED
 
 BLOCKS = 5
 """Stretches of the rows, each of which is predicted by a fit of the others."""
@@ -19,7 +20,7 @@ def held_out_errors(problem: Problem) -> Array:
 
     By weighted least squares, as fits of single stretches are by then.
     """
-    rows, fit = problem.explicit.rows, problem.explicit.factors.fit(2)
+    rows, fit = problem.explicit.rows, problem.explicit.factors.fit(CONVERGED)
     weight = np.tile(fit.weight, len(rows.time) // rows.kinds) * rows.valid
     return errors_of_stretches(problem.explicit, rows.W * weight[:, None], rows.Y * weight, rows.W)
 
@@ -28,14 +29,15 @@ def errors_of_stretches(problem: Problem, white: Array, Y: Array, plain: Array) 
     """Return what fits of `BLOCKS` - 1 stretches leave of the other, of rows (white, Y) that are made independent."""
     rows, own = problem.rows, len(plain)
     block = np.r_[np.arange(own) * BLOCKS // own, np.full(len(Y) - own, -1)]
-    errors = np.zeros(own)
+    errors, whole = np.zeros(own), np.linalg.norm(white, axis=0)
     for b in range(BLOCKS):
-        size = np.maximum(np.linalg.norm(white[block != b], axis=0), TINY)
+        size = np.linalg.norm(white[block != b], axis=0)
+        size = np.where(size > SHOWN * whole, size, np.inf)  # a push is in one stretch alone
         x = np.linalg.lstsq(white[block != b] / size, Y[block != b], rcond=SHOWN)[0] / size
         mine = block[:own] == b
         errors[mine] = rows.Y[mine] - plain[mine] @ x
-    squares, whole = (np.sum(rows.by_kind(x * rows.valid) ** 2, axis=-1) for x in (errors, rows.Y))
-    return np.asarray(100 * np.sqrt(np.maximum(squares, TINY) / np.maximum(whole, TINY)))
+    squares, of_all = (np.sum(rows.by_kind(x * rows.valid) ** 2, axis=-1) for x in (errors, rows.Y))
+    return np.asarray(100 * np.sqrt(np.maximum(squares, TINY) / np.maximum(of_all, TINY)))
 
 
 def scatter_of_sums(part: LogRows, left: Array, rest: Array) -> Array:

@@ -1,7 +1,9 @@
 """What a diagnosis finds."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import final
+
+from idbench.identify.arrays import Array
 
 
 @final
@@ -34,4 +36,8 @@ class Suspect:
     setting: float = 0.0
     """Of cogging: waves a turn; of a length: along which axis."""
     instant: float | None = None
-    """When it happened, or from when on it is there [s]."""
+    """When it happened in a log, or from when on it is there [s]."""
+    log: int | None = None
+    """In which of several logs, from 0."""
+    explained: Array | None = field(default=None, compare=False, repr=False)
+    """What it explains of the residuals of the explicit model's rows, where it is small, shape (r,) [N m]."""

@@ -34,6 +34,9 @@ MARGIN = 1.3
 EXCUSED = 0.02
 """Share of the torque up to which sigma of the parameters excuses an error: a misfit makes sigma large, too."""
 
+ROUNDING = 1e-12
+"""Share of the largest predicted torque below which one is rounding."""
+
 HELD_OUT = 0.25
 """Share of a log, at its end, that is held out where there is no second log."""
 
@@ -95,7 +98,7 @@ class Validation:
         return np.abs(self.correlation) <= self.bound
 
 
-def validate(held_out: Problem, X: Array, covariance: Array | None = None) -> Validation:
+def validate(held_out: Problem, X: Array, covariance: Array | None = None, noise: Array | None = None) -> Validation:
     """Return how well the parameters `X`, with their `covariance`, predict the torques of a log, by the explicit model.
 
     Both sides go through the same chain. Where a joint reverses or rests is judged apart, also where the chain masks nothing:
@@ -109,6 +112,8 @@ def validate(held_out: Problem, X: Array, covariance: Array | None = None) -> Va
         Parameters of its basis.
     covariance : Array, shape (p, p), optional
         Theirs.
+    noise : Array, shape (joint,), optional
+        Of the torques of poses at rest [N m], which do not show their noise themselves.
 
     Raises
     ------
@@ -130,7 +135,9 @@ def validate(held_out: Problem, X: Array, covariance: Array | None = None) -> Va
     rows = judged.parts[0].rows
     left = instants(signals, basis, ExplicitModel(), chain, X)
     moving = [_Joint.of(rows, X, j) for j in range(basis.n)]
-    standing = chain.operator.map(left.equations, left.equations.weighted_as(1.0 - signals.weight), chain.grid(signals.log))
+    rest = 1.0 - signals.weight
+    rest[..., list(signals.log.missing), :] = 0.0
+    standing = chain.operator.map(left.equations, left.equations.weighted_as(rest), chain.grid(signals.log))
     still = rows.by_kind(standing.measurement(left.everywhere)), shares(standing), standing.outside > 0
     rms, level, R2, correlation, count = zip(*(joint.judged() for joint in moving), strict=True)
     if not any(count):
@@ -138,7 +145,11 @@ def validate(held_out: Problem, X: Array, covariance: Array | None = None) -> Va
             "no joint moves in this log, as far as the mask of the chain sees: use another motion, or a lower --mask-speed"
         )
     bound = _bound(chain.operator, signals.fs) / np.sqrt(np.maximum(count, 1))
-    noise = row_noise(left, signals, chain) * [joint.unmasked for joint in moving]
+    if not signals.log.poses:
+        noise = row_noise(left, signals, chain) * [joint.unmasked for joint in moving]
+    elif noise is None:
+        noise = np.full(basis.n, np.nan)
+    noise = np.where(np.isfinite(rms), noise, np.nan)
     left_open = [joint.open(covariance) for joint in moving]
     still_rms = [_rms_of(*(x[j] for x in still)) for j in range(basis.n)]
     return Validation(*map(np.array, (rms, level, R2, still_rms, correlation, bound, count, noise, left_open)))
@@ -157,7 +168,7 @@ def _bound(operator: AbstractOperator, fs: float) -> float:
     """
     h, step = operator.response(fs), operator.step(fs)
     own = np.array([h[lag:] @ h[: len(h) - lag] for lag in range(0, len(h), step)]) / (h @ h)
-    largest = scipy.stats.norm.ppf((1 + WHITE ** (1 / (LAGS - 1))) / 2)
+    largest = scipy.special.ndtri((1 + WHITE ** (1 / (LAGS - 1))) / 2)
     return float(largest * np.sqrt(1 + 2 * np.sum(own[1:] ** 2)))
 
 
@@ -175,6 +186,8 @@ class _Joint:
     spread: Array
     share: Array
     X: Array
+    predicted: bool
+    """Whether anything predicts its torque: of an upright axis at rest, no gravity does."""
 
     @classmethod
     def of(cls, rows: Rows, X: Array, joint: int) -> "_Joint":
@@ -183,14 +196,18 @@ class _Joint:
         share = shares(rows.maps[0])[joint]
         # Y has the constant of laws that are linear about an estimate, too, which may be many times the torque.
         measured = rows.maps[0].measurement(rows.maps[0].signals.torque.mean)
-        return cls(measured[own], (rows.Y - rows.predicted(X))[own], rows.W[own], rows.valid[own], spread, share, X)
+        rho = rows.Y - rows.predicted(X)
+        of_model = np.abs(measured - rho)
+        some = of_model[own].max(initial=0.0) > ROUNDING * of_model.max(initial=0.0)
+        predicted = bool(some) or not rows.maps[0].signals.log.poses
+        return cls(measured[own], rho[own], rows.W[own], rows.valid[own], spread, share, X, predicted)
 
     def judged(self) -> tuple[float, float, float, float, int]:
         """Return the rms of residual and torque, R2, correlation, and the number of valid rows."""
         rho = self.rho[self.valid]
         y = self.y[self.valid]
         share = self.share[self.valid]
-        if not len(rho):
+        if not len(rho) or not self.predicted:
             return np.nan, np.nan, np.nan, np.nan, 0
         mean = float(share @ y) / self.rows
         spread = float(np.sum((y - mean * share) ** 2))

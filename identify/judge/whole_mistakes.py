@@ -5,15 +5,19 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
+import scipy
 
 from idbench.identify.arrays import Array
+from idbench.identify.basis.basis import Basis
 from idbench.identify.estimators.problem import Problem
-from idbench.identify.judge.fitted_motion import on_tree, tree_of
+from idbench.identify.judge.fitted_motion import carrying, on_tree, tree_of
 from idbench.identify.judge.stretches import held_out_errors
 from idbench.identify.judge.suspect import Suspect
+from idbench.identify.rows.factors import CONVERGED
 
 POOR = 5.0
-"""Residuals [% of a joint's torque] above which more is tried than signs of torques: a wrong axis leaves tens."""
+"""Residuals [% of a joint's torque] above which more is tried than signs of torques, also where no small mistake shows: a wrong
+axis leaves tens."""
 
 DECISIVE = 40.0
 """What a mistake takes of minus twice the logarithm of the likelihood at least: with rows that are correlated over ten of their
@@ -22,11 +26,19 @@ steps, four sigma of independent ones."""
 RATES = (0.8, 0.9, 0.95, 1.05, 1.1, 1.25)
 """Rates of the clock, over the stated one, that are tried where something is wrong."""
 
+RATE_STEP = 0.07
+"""How far from the best of them, as a share, a better one is looked for: as far as to the next."""
+
+NEARLY = 0.6
+"""Share of what a small mistake takes of the likelihood from which on a large one is its alternative."""
+
 MOST = 3
 """Large mistakes that are tried on held-out stretches, the most likely first."""
 
 NOTHING_LEFT = 1 / 3
 """Share of the largest error that the right sign or axis leaves at most: a wrong one also explains a part of other mistakes."""
+
+GRAVITY = 9.81  # [m/s^2]
 
 ALMOST_NONE = 1e-3
 """Share of gravity in torques that are without it: so little that parameters stay apart."""
@@ -43,22 +55,27 @@ class _Tried:
 
 
 def whole_mistake(problem: Problem, small: Suspect | None = None) -> Suspect | None:
-    """Return the mistake without which the rows are by far most likely, by more than a `small` one; None where none is."""
+    """Return the mistake without which the rows are by far most likely, by more than a `small` one; None where none is.
+
+    One that explains nearly as much as the small one is an alternative of it, which then is returned.
+    """
     explicit = problem.explicit
     before, counts = float(explicit.factors.misfit()), explicit.factors.rows
-    tried = [*_signs(explicit), *(_rates(explicit) if small else ())]
-    if _worst(explicit) > POOR:
-        tried += [*_exchanged(explicit), *_gravities(explicit), *_turned(explicit)]
+    tried = [*_signs(explicit), *_gravities(explicit), *(_rates(explicit) if small else ())]
+    if small or _worst(explicit) > POOR:
+        tried += [*_across(explicit), *_exchanged(explicit), *_turned(explicit)]
     gains = [before - float(each.problem.with_logs(each.problem.logs).factors.misfit(counts)) for each in tried]  # kept by none
     found = sorted(zip(gains, tried, strict=True), key=lambda one: -one[0])
     before_errors = held_out_errors(explicit)
     for gain, best in found[:MOST]:
-        if gain < max(DECISIVE, small.evidence if small else 0.0):
+        if gain < DECISIVE or (small and gain < NEARLY * small.evidence):
             break
         errors = held_out_errors(best.problem)
         k = int(np.argmax(np.log(before_errors) - np.log(errors)))
-        if errors[k] > min(NOTHING_LEFT * before_errors[k], small.held_out[1] if small else np.inf):
+        if errors[k] > NOTHING_LEFT * before_errors[k]:
             continue
+        if small and gain < DECISIVE + small.evidence:
+            return replace(small, alternatives=(*small.alternatives, (best.cause, best.joint)))
         near = [(each.cause, each.joint) for other, each in found if other > 0.9 * gain and each is not best]
         others = tuple(key for key in dict.fromkeys(near) if key != (best.cause, best.joint))
         pair, unit = (float(before_errors[k]), float(errors[k])), "rad" if best.cause == "zero" else "1"
@@ -70,7 +87,7 @@ def _worst(problem: Problem) -> float:
     """Return the largest residual of a joint [% of its torque]."""
     factors = problem.factors
     whole = np.sum(factors.R[..., -1] ** 2, axis=-1)
-    share = np.divide(factors.squares(factors.fit(2).X), whole, out=np.zeros(whole.shape), where=whole > 0)
+    share = np.divide(factors.squares(factors.fit(CONVERGED).X), whole, out=np.zeros(whole.shape), where=whole > 0)
     return float(100 * np.sqrt(np.max(share)))
 
 
@@ -99,10 +116,20 @@ def _diagonal(n: int, j: int) -> Array:
 
 
 def _rates(problem: Problem) -> Iterator[_Tried]:
-    """Yield other rates of the clock: times stated in other units, or a controller that is slower than it says."""
-    for rate in RATES:
-        logs = [replace(log, fs=log.fs * rate) for log in problem.logs]
-        yield _Tried("rate", "clock", None, (rate - 1,), problem.with_logs(logs))
+    """Yield another rate of the clock, the most likely near the best of some: a controller that is slower than it says."""
+
+    def at(rate: float) -> Problem:
+        return problem.with_logs([replace(log, fs=log.fs * rate) for log in problem.logs])
+
+    def unlikely(rate: float) -> float:
+        return float(at(rate).factors.misfit(problem.factors.rows))
+
+    best = int(np.argmin([unlikely(rate) for rate in RATES]))
+    if unlikely(RATES[best]) > problem.factors.misfit() - DECISIVE:
+        return
+    low, high = RATES[best] * (1 - RATE_STEP), RATES[best] * (1 + RATE_STEP)
+    found = scipy.optimize.minimize_scalar(unlikely, bounds=(low, high), method="bounded", options={"xatol": RATE_STEP / 50})
+    yield _Tried("rate", "clock", None, (float(found.x) - 1,), at(float(found.x)))
 
 
 def _exchanged(problem: Problem) -> Iterator[_Tried]:
@@ -112,18 +139,30 @@ def _exchanged(problem: Problem) -> Iterator[_Tried]:
         order = np.arange(n)
         order[[j, k]] = k, j
         yield _Tried("exchanged", "torque", j, (k + 1.0,), _changed(problem, tau=np.eye(n)[order]))
+        yield _Tried("exchanged", "position", j, (k + 1.0,), _changed(problem, q=np.eye(n)[order]))
 
 
 def _gravities(problem: Problem) -> Iterator[_Tried]:
-    """Yield gravity the other way, none, and along the other axes of the base."""
-    tree = tree_of(problem.basis)
-    if tree is None or not np.any(tree.gravity):
+    """Yield gravity the other way, and none: a robot on a ceiling, a driver that takes weight out of the torques."""
+    if (tree := tree_of(problem.basis)) is not None and np.any(tree.gravity):
+        yield from (_with_gravity(problem, problem.basis, share * tree.gravity) for share in (-1.0, ALMOST_NONE))
+
+
+def _across(problem: Problem) -> Iterator[_Tried]:
+    """Yield gravity along the other axes of the base: a robot on a wall; along each, where the file has none."""
+    if (tree := tree_of(problem.basis)) is None:
         return
-    g = float(np.linalg.norm(tree.gravity))
-    across = [sign * g * a for a in np.linalg.svd(tree.gravity[None])[2][1:] for sign in (1, -1)]
-    for gravity in (-tree.gravity, ALMOST_NONE * tree.gravity, *across):
-        elsewhere = problem.with_basis(on_tree(problem.basis, replace(tree, gravity=gravity)))
-        yield _Tried("gravity", "base", None, tuple(gravity.tolist()), elsewhere)
+    g, there = float(np.linalg.norm(tree.gravity)) or GRAVITY, bool(np.any(tree.gravity))
+    axes = np.linalg.svd(tree.gravity[None])[2][1:] if there else np.eye(3)
+    basis = carrying(problem.basis) if there and problem.prior is None else problem.basis  # which has rows of its own
+    yield from (_with_gravity(problem, basis, sign * g * a) for a in axes for sign in (1, -1))
+
+
+def _with_gravity(problem: Problem, basis: Basis, gravity: Array) -> _Tried:
+    tree = tree_of(basis)
+    assert tree is not None
+    elsewhere = problem.with_basis(on_tree(basis, replace(tree, gravity=gravity)))
+    return _Tried("gravity", "base", None, tuple(gravity.tolist()), elsewhere)
 
 
 def _turned(problem: Problem) -> Iterator[_Tried]:

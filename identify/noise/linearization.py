@@ -7,12 +7,13 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-import scipy
 
 from idbench.identify.arrays import HELD, Array, combined, frozen
 from idbench.identify.basis.basis import Basis
+from idbench.identify.basis.newton_euler import momenta, torques
 from idbench.identify.signals.filters import slide
 from idbench.identify.signals.signals import Signals, State
+from idbench.identify.signals.spectra import parabola
 
 STEP_Q, STEP_QD = 1e-3, 0.05
 """Steps [rad, rad/s] of central differences: torques are sines of positions, and squares of velocities."""
@@ -104,14 +105,14 @@ def slopes(
     n = basis.n
     slides = np.where(np.abs(slow) < SLIDING, np.copysign(SLIDING, slow), slow)
     unit, still = np.eye(n).reshape(n, *[1] * (q.ndim - 2), n, 1), np.zeros((n, *q.shape))
-    # All in one go: the columns of trees take as long for one sample as for hundreds.
+    # All in one go: trees take as long for one sample as for hundreds.
     q_steps, qd_steps = STEP_Q * unit, STEP_QD * unit
     turned = np.concatenate([q + still, q + still, q + q_steps, q - q_steps])
     moved = np.concatenate([slides + qd_steps, slides - qd_steps, qd + still, qd + still])
     there = State(turned, moved, lambda _: np.broadcast_to(qdd, turned.shape), conditions or {})
-    faster, slower, ahead, behind = np.split(combined(basis.explicit(there), X, np.zeros_like(turned)), 4)
+    faster, slower, ahead, behind = np.split(torques(basis, there, X), 4)
     at_rest = State(q + still, unit + still, lambda x: x, conditions or {})
-    inertia = combined(basis.momentum(at_rest), X, np.zeros_like(at_rest.q))
+    inertia = momenta(basis, at_rest, X)
     found = inertia, (faster - slower) / (2 * STEP_QD), (ahead - behind) / (2 * STEP_Q)
     return Slopes(*(np.moveaxis(x, 0, -2) for x in found))
 
@@ -153,4 +154,4 @@ def _between(x: Array, places: npt.NDArray[np.intp], every: int) -> Array:
 @lru_cache(maxsize=16)
 def _parabola(window: int) -> Array:
     """Return what samples count for in the middle of the parabola through them (Savitzky and Golay)."""
-    return frozen(scipy.signal.savgol_coeffs(window, 2))
+    return frozen(parabola(window))

@@ -93,6 +93,8 @@ def torque_noise(logs: Sequence[Signals], residual: Array) -> Array:
     residual : Array, shape (..., joint)
         The noise of the torques that would explain residuals [N m].
     """
+    if any(each.log.poses for each in logs):
+        return residual
     rms = np.sqrt(np.mean([np.mean(_logged(each, "tau") ** 2, axis=-1) for each in logs], axis=0))
     return np.minimum(np.maximum(white_noise(logs, "tau"), EXACT * rms), residual)
 
@@ -120,7 +122,7 @@ def white_noise(logs: Sequence[Signals], logged: Literal["q", "tau"]) -> Array:
         inner = slice(ORDER // 2, -(ORDER // 2))  # beyond the ends of a log there is nothing
         moving = (signals.weight == 1)[..., inner]
         differences = slide(_logged(signals, logged), weights)[..., inner]
-        counts = np.stack([moving, differences != 0])
+        counts = np.stack([moving, differences != 0]) & (not signals.log.poses)  # nothing is between two of these
         squares = squares + np.sum(differences**2 * counts, axis=-1)
         count = count + np.sum(counts, axis=-1)
     used, changing = np.where(np.asarray(count) >= MIN_SAMPLES, np.sqrt(squares / np.maximum(count, 1)), 0.0)

@@ -109,7 +109,7 @@ class BaseParameters:
         """Standard parameters that no motion excites."""
         return tuple(name for name, used in zip(self.standard.names, np.any(self.K, axis=0), strict=True) if not used)
 
-    @property
+    @cached_property
     def groupings(self) -> dict[str, str]:
         """What each base parameter is made of, by its name."""
         return {name: self.grouping(i) for i, name in enumerate(self.names)}

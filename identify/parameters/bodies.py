@@ -37,6 +37,20 @@ def inertial(S: Array) -> Array:
     return np.array([*inertia[np.triu_indices(3)], *S[:3, 3], S[3, 3]])
 
 
+def exist(parameters: Sequence[Parameter], values: Array) -> bool:
+    """Return whether all links of a robot can exist, and no armature or friction is below zero."""
+    links: dict[tuple[int | None, str], dict[str, float]] = {}
+    for parameter, value in zip(parameters, values.tolist(), strict=True):
+        if parameter.symbol in INERTIAL:
+            links.setdefault((parameter.joint, parameter.drive), {})[parameter.symbol] = value
+        elif parameter.kind in NOT_NEGATIVE and value < 0:
+            return False
+    own = np.array([[link.get(x, 0.0) for x in INERTIAL] for link in links.values() if len(link) == len(INERTIAL)])
+    S = pseudo_inertia(own)
+    least = LEAST * np.trace(S, axis1=-2, axis2=-1)
+    return not len(own) or bool((np.linalg.eigvalsh(S) > least[:, None]).all())
+
+
 FLAT = 1e-6
 """Share of the largest eigenvalue below which the least says that a body is flat."""
 

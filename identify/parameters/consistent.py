@@ -46,7 +46,7 @@ class Consistent:
     @property
     def agrees(self) -> bool:
         """Whether the estimate's uncertainty explains the distance."""
-        return bool(self.distance**2 <= scipy.stats.chi2.ppf(CONFIDENCE, max(self.touched, 1)))
+        return bool(self.distance**2 <= scipy.special.chdtri(max(self.touched, 1), 1 - CONFIDENCE))
 
 
 def consistent_parameters(

@@ -102,6 +102,8 @@ class Chain:
 
     def margin(self, log: MotionLog) -> float:
         """Return the time at either end of `log` that makes no rows [s]; raise SettingError if `trim` is too short."""
+        if log.poses:
+            return 0.0
         halo = self.halo(log.fs, log.torque)
         if self.trim is None:
             return halo
@@ -134,6 +136,11 @@ def paper_masked_chain() -> Chain:
 def unfiltered_chain() -> Chain:
     """As idbench, without a filter: every sample is a row."""
     return replace(idbench_chain(), operator=Samples())
+
+
+def poses_chain() -> Chain:
+    """For logs of poses at rest: every sample is a row, and nothing is masked or differentiated."""
+    return Chain(NoPrefilter(), CentralDifference(2), AsLogged(), NoMask(), Samples())
 
 
 CHAINS: Table[Chain] = Table(

@@ -8,11 +8,10 @@ kt = ke is the torque constant as seen behind the gear, R the resistance, V the 
 and rad. Friction and the rotor's inertia Ia act as at any joint.
 """
 
-from idbench.identify.servo.closed_loop import Servo as Servo
 from idbench.identify.servo.fit import ServoFit as ServoFit
-from idbench.identify.servo.fit import UnscaledError as UnscaledError
 from idbench.identify.servo.identification import identify_again as identify_again
 from idbench.identify.servo.identification import identify_servo as identify_servo
+from idbench.identify.servo.law import Servo as Servo
 from idbench.identify.servo.parameters import SERVO_FRICTIONS as SERVO_FRICTIONS
 from idbench.identify.servo.parameters import parameters_of as parameters_of
 from idbench.identify.servo.run import JointLoad as JointLoad

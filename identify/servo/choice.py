@@ -8,9 +8,7 @@ import numpy as np
 from scipy.stats import wilcoxon
 
 from idbench.identify.arrays import Array
-from idbench.identify.errors import IdentificationError
-from idbench.identify.servo.closed_loop import Servo
-from idbench.identify.servo.fit import ServoFit, UnscaledError, require_scale
+from idbench.identify.servo.fit import ServoFit
 from idbench.identify.servo.left_out import left_out, stretches
 from idbench.identify.servo.parameters import SERVO_FRICTIONS, SIMPLER, parameters_of
 from idbench.identify.servo.run import ServoRun
@@ -37,13 +35,13 @@ class ServoLack(NamedTuple):
 
 def lacks_of(fit: ServoFit) -> list[ServoLack]:
     """Return residuals by what the joint is doing, the largest first."""
-    loop, servo = fit.loop, fit.servo
+    loop = fit.loop
     speed = np.stack([_spread(np.abs(np.gradient(run.clean, run.t)), loop.samples) for run in loop.runs])
     on = np.stack([_spread(run.enabled.astype(float), loop.samples) > 0.5 for run in loop.runs])
     duty = np.stack(
-        [_spread(servo.gain * run.kp * np.abs(run.command - run.clean), loop.samples) for run in loop.runs]
+        [_spread(run.servo.slope * np.abs(run.command - run.clean) / run.servo.limit, loop.samples) for run in loop.runs]
     )  # of the command, not of its target: what matters is whether the joint is near it
-    moving, full = speed > SLOW * fit.excitation.speed, duty > servo.duty_limit
+    moving, full = speed > SLOW * fit.excitation.speed, duty > 1
     r = np.abs(fit.found.residual)
     kinds = {
         "torque is off": ~on,
@@ -74,7 +72,7 @@ class ServoFrictionChoice:
     """Laws of friction compared."""
 
     fits: dict[str, ServoFit]
-    """By the law, those that can be fitted."""
+    """By the law."""
     chosen: str
     """The law to use."""
     errors: dict[str, float]
@@ -89,7 +87,7 @@ class ServoFrictionChoice:
 
 
 def choose_friction(
-    servo: Servo, runs: Sequence[ServoRun], more: Sequence[str] = (), held: dict[str, float] | None = None
+    runs: Sequence[ServoRun], more: Sequence[str] = (), held: dict[str, float] | None = None
 ) -> ServoFrictionChoice:
     """Return the laws of friction compared, each by parts of the log that its fit did not see (see `left_out`).
 
@@ -99,24 +97,16 @@ def choose_friction(
     Raises
     ------
     IdentificationError
-        If no law can be fitted.
+        As for `identify_servo`.
     """
     fits = dict[str, ServoFit]()
-    why = list[IdentificationError]()
     rough = dict[str, dict[str, float]]()
     of_laws = {name for names in SERVO_FRICTIONS.values() for name in names}
     parameters_of("coulomb", (*more, *(name for name in held or {} if name not in of_laws)))
-    stages = Stages.begun(servo, runs, more, held or {})
+    stages = Stages.begun(runs, more, held or {})
     for law in SERVO_FRICTIONS:  # simpler ones come first
         rough[law] = stages.go(law, (), rough[SIMPLER[law]] if law in SIMPLER else stages.start)
-        try:
-            fits[law] = stages.fit(law, more, stages.go(law, more, rough[law]) if more else rough[law])
-        except UnscaledError as error:  # whether a law is the right one, its scale does not say
-            fits[law] = error.fit
-        except IdentificationError as error:
-            why.append(error)
-    if not fits:
-        raise why[0]
+        fits[law] = stages.fit(law, more, stages.go(law, more, rough[law]) if more else rough[law])
     c = 3 * float(np.median([fit.scale for fit in fits.values()]))  # one measure for all
     clusters = PER_PARAMETER * max(len(fit.free) for fit in fits.values())
     parts = min(stretches(fit.found, fit.loop, clusters) for fit in fits.values())  # the same parts of the log for all laws
@@ -128,7 +118,6 @@ def choose_friction(
         p[law] = _p(costs[law], costs[first], tests)
         if costs[law].mean() < costs[chosen].mean() and _p(costs[law], costs[chosen], tests) < LEVEL:
             chosen = law
-    require_scale(fits[chosen])
     return ServoFrictionChoice(fits, chosen, {law: float(np.sqrt(x.mean())) for law, x in costs.items()}, p)
 
 

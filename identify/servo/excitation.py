@@ -7,14 +7,19 @@ from typing import Self, final
 import numpy as np
 
 from idbench.identify.errors import ExcitationError, IdentificationError
-from idbench.identify.servo.closed_loop import Servo
 from idbench.identify.servo.run import ServoRun
 
 TILTS = 0.01
 """Share of gravity that turns with the joint, of its typical torque, from which on an offset of the position shows."""
 
 TYPICAL = 0.1
-"""Duty of a joint that carries nothing."""
+"""Share of what a loop commands that a joint needs which carries nothing."""
+
+NOTHING = 1e-6
+"""Share of what a loop commands that no known load makes: rounding of the robot's file."""
+
+SCALES = ("a", "b", "Ia", "Fs", "Fv")
+"""Parameters of which one that is known sets the scale of torques."""
 
 DEGREES = 20.0
 """Times the range of the positions from which on commands are in another unit."""
@@ -39,14 +44,16 @@ class Excitation:
     """Whether torque is off in some motion: friction then shows apart from back-EMF."""
     tilts: bool
     """Whether gravity depends on the position: only then does an offset show."""
+    loaded: bool
+    """Whether anything known sets the scale of torques."""
 
     @classmethod
-    def of(cls, servo: Servo, runs: Sequence[ServoRun], held: Mapping[str, float]) -> Self:
+    def of(cls, runs: Sequence[ServoRun], held: Mapping[str, float]) -> Self:
         """Return what runs can show, some parameters being known; raise IdentificationError if that is nothing."""
         if not runs:
             raise IdentificationError("there is no run of the servo")
         ranges = [float(np.ptp(run.clean)) for run in runs]
-        if max(ranges) < 20 * servo.step:
+        if max(ranges) < 20 * max(run.step for run in runs):
             raise ExcitationError(
                 f"{runs[0].name}: the joint does not move (by {np.rad2deg(max(ranges)):.2g} deg): log motions of a good part "
                 "of its range, with steps and reversals"
@@ -61,27 +68,27 @@ class Excitation:
                 f"{run.name}: the command spans {np.ptp(run.command):.4g}, the position {np.ptp(run.clean):.4g} rad: is the "
                 "command in degrees or counts? State its unit: --units command=deg"
             )
-        if all(_saturated(servo, run) for run in runs):
+        if all(_saturated(run) for run in runs):
             raise ExcitationError(
                 f"{runs[0].name}: the duty is at its limit almost all the time, where the command has no effect: command "
                 "slower motions, or smaller steps"
             )
         speeds = np.concatenate([np.abs(np.gradient(run.clean, run.t)) for run in runs])
         # A load that moves with the joint sets the scale of torque; where there is none, what its inertia would need.
-        loads = [float(np.sqrt(np.mean(run.load.torque(run.clean) ** 2))) for run in runs]
+        loads = [float(np.sqrt(np.mean(run.load.torque(run.t, run.clean) ** 2))) for run in runs]
         inertia = max(float(np.mean(run.load.inertia)) for run in runs)
         T = float(np.median([run.T for run in runs]))
         speed = float(np.quantile(speeds, 0.99))
         torque = max(float(np.sqrt(np.mean(np.square(loads)))), (inertia + held.get("Ia", 0.0)) * speed / (50 * T))
-        torque = max(torque, TYPICAL * held.get("a", 0.0) * servo.supply, held.get("b", 0.0) * speed, held.get("Fs", 0.0))
-        if torque == 0:
-            raise ExcitationError(
-                f"{runs[0].name}: the joint carries no known load, so that only ratios of a, b, friction and armature show: "
-                "add a known mass to the robot's file, move the joint through gravity, or give one of them (--hold JOINT.a=0.5)"
-            )
-        off = any((~run.enabled).any() and np.ptp(run.clean[~run.enabled]) > 20 * servo.step for run in runs)
+        driven = max(run.servo.supply * min(run.servo.limit, _commanded(run)) for run in runs)
+        torque = max(torque, TYPICAL * held.get("a", 0.0) * driven, held.get("b", 0.0) * speed, held.get("Fs", 0.0))
+        if loaded := torque > 0:
+            loaded = torque > NOTHING * driven or any(name in held for name in SCALES)
+        if not loaded:  # ratios show, of torques that are then those of a = 1
+            torque = TYPICAL * driven
+        off = any((~run.enabled).any() and np.ptp(run.clean[~run.enabled]) > 20 * run.step for run in runs)
         swing = max(float(np.hypot(run.load.sine, run.load.cosine).max()) for run in runs)
-        return cls(max(ranges), speed, torque, T, servo.step, off, swing > TILTS * torque)
+        return cls(max(ranges), speed, torque, T, max(run.still for run in runs), off, swing > TILTS * torque, loaded)
 
     @property
     def scales(self) -> dict[str, float]:
@@ -96,6 +103,11 @@ class Excitation:
         }
 
 
-def _saturated(servo: Servo, run: ServoRun) -> bool:
-    duty = servo.gain * run.kp * np.abs(run.command - run.clean)[run.enabled]
-    return bool(duty.size) and bool(np.mean(duty >= servo.duty_limit) > 0.98)
+def _saturated(run: ServoRun) -> bool:
+    duty = run.servo.slope * np.abs(run.command - run.clean)[run.enabled]
+    return bool(duty.size) and bool(np.mean(duty >= run.servo.limit) > 0.98)
+
+
+def _commanded(run: ServoRun) -> float:
+    """Return the root mean square of what the loop commands for the error of the position."""
+    return float(run.servo.slope * np.sqrt(np.mean((run.command - run.clean) ** 2)))

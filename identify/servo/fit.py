@@ -3,14 +3,16 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Self, final
+from typing import final
 
 import numpy as np
+import numpy.typing as npt
 
 from idbench.identify.arrays import Array
-from idbench.identify.errors import ExcitationError, IdentificationError, SettingError
-from idbench.identify.servo.closed_loop import Servo, ServoLoop
+from idbench.identify.errors import SettingError
+from idbench.identify.servo.closed_loop import STATES, ServoLoop, begin_of
 from idbench.identify.servo.excitation import Excitation
+from idbench.identify.servo.law import Servo
 from idbench.identify.servo.left_out import LeftOut, left_out, stretches
 from idbench.identify.servo.parameters import SERVO_PARAMETERS
 from idbench.identify.servo.run import ServoRun
@@ -29,8 +31,6 @@ MIN_PARTS = 24
 class ServoFit:
     """What was identified of a servo."""
 
-    servo: Servo
-    """What was known."""
     friction: str
     """Law of friction."""
     free: tuple[str, ...]
@@ -41,11 +41,23 @@ class ServoFit:
     """The runs that it looked at."""
     excitation: Excitation
     """What the runs can show."""
-    contrast: float
-    """How many times larger the objective is at least with half as much again, or two thirds, of the torque per volt, and with
-    all others as that needs them: near 1 where no known load sets the scale of the torques."""
+    contrasts: tuple[float, float]
+    """How many times larger the objective is with two thirds, and with half as much again, of the torque per volt, and with all
+    others as that needs them: near 1 where no known load sets the scale of the torques."""
     of_all: Array | None = None
     """Covariance of the free parameters, where it contains errors of other joints (see `together`), shape (p, p)."""
+
+    @property
+    def servo(self) -> Servo:
+        """What is known of the loop, in the first run."""
+        return self.loop.runs[0].servo
+
+    @property
+    def taken_late(self) -> float:
+        """What the integrator of a simulation takes late of the damping, h D [kg m^2]; 0 of a real joint."""
+        servo = self.servo
+        loop = self.p["a"] * servo.supply * (servo.kd + servo.slope * self.p.get("lead", 0.0)) + self.p["b"]
+        return 2 * (max(servo.steps.joint, 0.0) * self.p["Fv"] + max(servo.steps.loop, 0.0) * loop)
 
     @property
     def p(self) -> dict[str, float]:
@@ -56,6 +68,28 @@ class ServoFit:
     def left_out(self) -> LeftOut:
         """The fit without each run, or piece of a run."""
         return left_out(self.found, self.loop, 3 * self.scale, stretches(self.found, self.loop, CLUSTERS * len(self.free)))
+
+    @property
+    def scaled(self) -> bool:
+        """Whether other torques explain the motion less well: if not, all torques are known up to a common factor."""
+        return self.parts * (min(self.contrasts) - 1) >= MIN_RISE
+
+    @property
+    def factor(self) -> tuple[float, float]:
+        """By how much all torques may be smaller and larger at once: two standard errors of a parabola over its logarithm."""
+        rises = [max(self.parts * (contrast - 1) / SIGMAS**2, LEAST_RISE) for contrast in self.contrasts]
+        low, high = (OTHER_SCALE ** (sign / np.sqrt(rise)) for sign, rise in zip((-1, 1), rises, strict=True))
+        return float(low), float(high)
+
+    @property
+    def known(self) -> frozenset[str]:
+        """Parameters that were not searched for."""
+        return frozenset(self.p) - set(self.free) - ({"a"} if not self.excitation.loaded else set())
+
+    @property
+    def explained(self) -> bool:
+        """Whether commands explain the motion."""
+        return self.scale <= UNEXPLAINED * self.excitation.range
 
     @property
     def parts(self) -> int:
@@ -82,24 +116,57 @@ class ServoFit:
         size = np.sqrt((J**2).sum(axis=0))
         size = np.where(size > 0, size, 1.0)
         inverse = np.linalg.pinv((free / size).T @ (J / size))
-        return dict(
-            zip(self.free, (self.servo.step / np.sqrt(12) * np.sqrt(np.diagonal(inverse)) / size).tolist(), strict=True)
-        )
+        sigma = self.loop.step / np.sqrt(12) * np.sqrt(np.maximum(np.diagonal(inverse), 0.0)) / size
+        return dict(zip(self.free, sigma.tolist(), strict=True))
 
     @property
     def scale(self) -> float:
         """Typical size of a residual [rad]."""
-        return max(float(np.median(np.abs(self.found.residual[self.loop.kept]))), self.servo.step / 4)
+        return max(float(np.median(np.abs(self.found.residual[self.loop.kept]))), self.loop.step / 4)
 
     def simulate(self, runs: Sequence[ServoRun]) -> list[Array]:
         """Return the positions of runs from their commands alone [rad], at their samples, without the encoder's rounding."""
-        q = ServoLoop(self.servo, runs, self.loop.h).simulate(self.p)[0]
+        q = ServoLoop(runs, self.loop.h).simulate(self.p)[0]
         return [x[: len(run.t)] for x, run in zip(q, runs, strict=True)]
 
+    def fine(self, run: ServoRun) -> tuple[Array, Array]:
+        """Return the steps of a simulation [s], on the clock of a run, and its positions from its commands alone [rad]."""
+        t = np.arange(run.t[0], run.t[-1], self.loop.h)
+        place = np.searchsorted(run.t, t + 1e-9, side="right") - 1
+        on = run.enabled[place]
+        held = (run.command, run.voltage, run.forward)
+        command, voltage, forward = (None if x is None else x[place] for x in held)
+        assert command is not None
+        q = np.interp(t, run.t, run.clean)
+        finer = replace(run, t=t, q=q, command=command, on=on, voltage=voltage, forward=forward)
+        return t, self.simulate([finer])[0]
+
     def errors(self, runs: Sequence[ServoRun]) -> Array:
-        """Return the mean absolute error of each run's position, simulated from its commands alone [rad], without spikes."""
-        every = zip(runs, self.simulate(runs), strict=True)
-        return np.array([np.abs(run.q - q)[run.read_well].mean() for run, q in every])
+        """Return the mean absolute error of each run's position, simulated from its commands alone [rad], without spikes.
+
+        Of a run that begins in motion, the time is left out over which its unknown beginning matters.
+        """
+        every = zip(runs, self.simulate(runs), self.follows(runs), strict=True)
+        return np.array([np.abs(run.q - q)[run.read_well & follows].mean() for run, q, follows in every])
+
+    def follows(self, runs: Sequence[ServoRun]) -> list[npt.NDArray[np.bool_]]:
+        """Return at which samples of runs another beginning, within what is known of it, would change nothing.
+
+        That is another speed, by a count, and a target that is where the joint is. If it changes the second half of a run, too,
+        as where nothing holds the joint, all samples are returned.
+        """
+        loop = ServoLoop(runs, self.loop.h)
+        ahead = np.zeros((len(runs), STATES))
+        for other, run, begin in zip(ahead, runs, map(begin_of, runs), strict=True):
+            if begin.per_angle[-1] > 0:
+                other[1:] = run.still, (begin.state[0] - run.command[0]) / begin.per_angle[-1]
+        apart = np.abs(loop.simulate(self.p)[0] - loop.simulate(self.p, ahead)[0])
+        return [self._after(one[: len(run.t)] > run.still) for one, run in zip(apart, runs, strict=True)]
+
+    @staticmethod
+    def _after(apart: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
+        last = int(np.flatnonzero(apart)[-1]) + 1 if apart.any() else 0
+        return np.arange(len(apart)) >= (last if last <= len(apart) // 2 else 0)
 
 
 TORQUES = ("a", "b", "Ia", "Fs", "Fv", "Fst", "Fo")
@@ -113,53 +180,14 @@ MIN_RISE = 16.0
 part counts as one observation. Simulated joints whose scale was wrong had 0 to 14, those with a mass that sets it 26 and more;
 the public bench had 5 to 31 from single runs, 23 from a hundred."""
 
+SIGMAS = 2.0
+"""Standard errors that a range of the common factor has."""
+
+LEAST_RISE = 0.01
+"""Rise below which nothing is known of the factor: it is then stated as 1/60 to 60."""
+
 UNEXPLAINED = 0.2
 """Typical residual, as a share of the range of the motion, from which on a fit explains nothing."""
-
-
-class UnscaledError(ExcitationError):
-    """Torques without a scale: the fit explains how the joint moves, but not by which torques.
-
-    Parameters
-    ----------
-    message : str
-        The message.
-    fit : ServoFit
-        The fit.
-    """
-
-    def __init__(self, message: str, fit: ServoFit) -> None:
-        super().__init__(message)
-        self.fit = fit
-
-    def __reduce__(self) -> tuple[type[Self], tuple[str, ServoFit]]:
-        """Keep the fit when the error comes from another process."""
-        return type(self), (str(self), self.fit)
-
-
-def require_explained(fit: ServoFit) -> None:
-    """Raise IdentificationError if commands do not explain the motion."""
-    if fit.scale > UNEXPLAINED * fit.excitation.range:
-        raise IdentificationError(
-            f"{fit.loop.runs[0].name}: commands explain the motion to {fit.scale:.2g} rad only, of {fit.excitation.range:.2g} "
-            "rad: check kp, gain and counts of the servo, and that the joint moves freely"
-        )
-
-
-def has_scale(fit: ServoFit) -> bool:
-    """Return whether other torques explain the motion less well."""
-    return fit.parts * (fit.contrast - 1) >= MIN_RISE
-
-
-def require_scale(fit: ServoFit) -> None:
-    """Raise UnscaledError if other torques explain the motion as well."""
-    if not has_scale(fit):
-        why = "gravity is free as well (Mg)" if "Mg" in fit.free else "the known load is small beside them"
-        raise UnscaledError(
-            f"{fit.loop.runs[0].name}: torque constant, friction and armature scale together, because {why}: add a known mass "
-            "to the robot's file, log more motion, or give one of them (--hold JOINT.a=0.5)",
-            fit,
-        )
 
 
 def require_possible(held: Mapping[str, float]) -> None:

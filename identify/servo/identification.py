@@ -7,9 +7,9 @@ from typing import NamedTuple, final
 import numpy as np
 
 from idbench.identify.arrays import Array
-from idbench.identify.servo.closed_loop import Servo, ServoLoop
+from idbench.identify.servo.closed_loop import ServoLoop
 from idbench.identify.servo.fit import ServoFit
-from idbench.identify.servo.parameters import limits_of, parameters_of, simpler
+from idbench.identify.servo.parameters import FURTHER, limits_of, parameters_of, simpler
 from idbench.identify.servo.run import ServoRun
 from idbench.identify.servo.stages import Stages
 from idbench.identify.telling import one_thread
@@ -32,20 +32,22 @@ class OffsetJoint(NamedTuple):
     joint."""
 
 
-def per_offset(fit: ServoFit, other: Sequence[ServoRun]) -> Array:
+def per_offset(fit: ServoFit, runs: Sequence[ServoRun], other: Sequence[ServoRun]) -> Array:
     """Return by how much the free parameters of a fit change per rad of another joint's offset, shape (p,).
 
     Parameters
     ----------
     fit : ServoFit
         The fit of one joint.
+    runs : sequence of ServoRun
+        The runs that it looked at.
     other : sequence of ServoRun
-        The runs that it looked at, with their loads if the offset of the other joint is larger by `APART`.
+        The same, with their loads if the offset of the other joint is larger by `APART`.
     """
     found, size = fit.found, np.sqrt((fit.found.sensitivity**2).mean(axis=(0, 1)))
     size = np.where(size > 0, size, 1.0)
     with one_thread():
-        q, moved = (ServoLoop(fit.servo, runs, fit.loop.h).simulate(fit.p)[0] for runs in (fit.loop.runs, other))
+        q, moved = (ServoLoop(runs, fit.loop.h).simulate(fit.p)[0] for runs in (runs, other))
     w = (1 + np.abs(found.residual) / (3 * fit.scale)) ** -2
     free = found.beginning.weighted(w).without(found.sensitivity / size) * w[..., None]
     curvature = np.einsum("rti,rtj->ij", free, found.sensitivity / size)
@@ -102,7 +104,6 @@ def _moved(fit: ServoFit, by: Array, covariance: Array) -> ServoFit:
 
 
 def identify_servo(
-    servo: Servo,
     runs: Sequence[ServoRun],
     friction: str = "load",
     more: Sequence[str] = (),
@@ -115,10 +116,8 @@ def identify_servo(
 
     Parameters
     ----------
-    servo : Servo
-        What is known.
     runs : sequence of ServoRun
-        What was logged, with known loads.
+        What was logged, with known loads, and what is known of the loop.
     friction : str
         A law of `SERVO_FRICTIONS`.
     more : sequence of str
@@ -134,11 +133,21 @@ def identify_servo(
         If a name is unknown.
     """
     parameters_of(friction, (*more, *(held or {})))
-    stages = Stages.begun(servo, runs, more, held or {})
+    stages = Stages.begun(runs, more, held or {})
     p = stages.start
     for law in simpler(friction):
         p = stages.go(law, (), p)
     return stages.fit(friction, more, stages.go(friction, more, p))
+
+
+def with_friction(fit: ServoFit, friction: str) -> ServoFit:
+    """Return a fit with a simpler law of friction, which begins with what friction was on average, from where it is."""
+    kept = parameters_of(friction, [name for name in fit.p if name in FURTHER])
+    loads = [np.abs(run.load.torque(run.t, run.clean)).mean() for run in fit.loop.runs]
+    per_load = sum(fit.p.get(name, 0.0) for name in ("Fl", "Fle", "Fgd"))
+    p = {name: x for name, x in fit.p.items() if name in kept} | {"Fs": fit.p["Fs"] + per_load * float(np.mean(loads))}
+    held = {name: x for name, x in p.items() if name not in fit.free}
+    return Stages(fit.loop.runs, held, p, cut=False).last(friction, tuple(name for name in fit.free if name in p), p)
 
 
 def identify_again(fit: ServoFit, runs: Sequence[ServoRun]) -> ServoFit:
@@ -150,4 +159,4 @@ def identify_again(fit: ServoFit, runs: Sequence[ServoRun]) -> ServoFit:
         As for `identify_servo`.
     """
     held = {name: x for name, x in fit.p.items() if name not in fit.free}
-    return Stages(fit.servo, runs, held, fit.p).last(fit.friction, fit.free, fit.p)
+    return Stages(runs, held, fit.p).last(fit.friction, fit.free, fit.p, fit.contrasts)

@@ -12,6 +12,10 @@ from idbench.identify.servo.search import Found
 UNCORRELATED = 0.05
 """Correlation of residuals below which stretches of time are taken as independent."""
 
+MIN_CLUSTERS = 8
+"""Clusters by which a covariance is found at least: of one there is none, of few it is by chance. Where residuals are
+correlated over longer times, as an offset is over all of a log, standard errors are then too small."""
+
 MOST_LEVERAGE = 0.99
 """Of a cluster on its own fit: beyond, nothing is left of its residuals to say how they scatter."""
 
@@ -21,6 +25,8 @@ MOST_LEVERAGE = 0.99
 class LeftOut:
     """A fit without each of its clusters, from one step of the search (the jackknife)."""
 
+    inverse: Array
+    """Inverse of the curvature of the objective, shape (p, p)."""
     covariance: Array
     """Of the parameters, shape (p, p)."""
     costs: Array
@@ -60,7 +66,8 @@ def left_out(found: Found, loop: ServoLoop, c: float, parts: int) -> LeftOut:
     ], axis=1)  # fmt: skip
     u = np.abs(lacking) / c
     costs = _summed(2 * c**2 * (u - np.log1p(u)), parts) / np.maximum(_summed(loop.kept.astype(float), parts), 1.0)
-    return LeftOut(np.asarray(inverse @ S @ inverse / np.outer(size, size)), costs)
+    sizes = np.outer(size, size)
+    return LeftOut(np.asarray(inverse / sizes), np.asarray(inverse @ S @ inverse / sizes), costs)
 
 
 def _jackknife(scores: Array, curvatures: Array) -> tuple[Array, Array, Array]:
@@ -85,10 +92,10 @@ def _summed(x: Array, parts: int) -> Array:
 
 
 def stretches(found: Found, loop: ServoLoop, clusters: int) -> int:
-    """Return into how many stretches runs are cut: enough for so many clusters, none shorter than residuals are correlated."""
+    """Return into how many stretches runs are cut: enough for so many clusters, no more than correlations allow."""
     r = found.residual
-    wanted = int(np.ceil(clusters / len(r)))
-    return max(1, min(wanted, loop.samples // _correlated(r)))
+    wanted, least = (int(np.ceil(x / len(r))) for x in (clusters, MIN_CLUSTERS))
+    return max(least, min(wanted, loop.samples // _correlated(r)))
 
 
 def _correlated(r: Array) -> int:

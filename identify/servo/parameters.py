@@ -72,17 +72,22 @@ LATEST = 1.0
 """Longest delay of a command [s]: what comes later is no response to it."""
 
 SERVO_PARAMETERS: dict[str, ServoParameter] = {
-    "a": ServoParameter("N m/V", "torque per volt, kt/R", 0.03),
+    "a": ServoParameter("N m/V", "torque per volt, kt/R; of a loop that commands torque or current, per N m or A", 0.03),
     "b": ServoParameter("N m s/rad", "damping by back-EMF, kt^2/R", 0.03),
     "Ia": ServoParameter("kg m^2", "armature: inertia of the rotor behind the gear", 0.04),
     "Fs": ServoParameter("N m", "Coulomb friction", of="torque", share=0.01),
     "Fv": ServoParameter("N m s/rad", "viscous friction", of="torque per speed", share=0.01),
     "offset": ServoParameter("rad", "angle of the file minus angle of the log", of="angle", share=2.0, low=-np.pi, high=np.pi),
-    "delay": ServoParameter("s", "delay of the command", of="time", share=0.15, high=LATEST),
+    "delay": ServoParameter("s", "delay of the command", of="time", share=0.15, low=-LATEST, high=LATEST),
     "rate": ServoParameter("rad/s", "rate limit of the target", 0.02),
+    "lag": ServoParameter("s", "time constant of the command's low-pass", of="time", share=0.15, high=LATEST),
     "lead": ServoParameter("s", "by how much the loop sees its position early", of="time", share=0.15, low=NEGATIVE),
     "dead_band": ServoParameter("rad", "error below which there is no duty", of="angle", share=1.0),
     "backlash": ServoParameter("rad", "free play between rotor and link", of="angle", share=1.0),
+    "gain_error": ServoParameter("1", "share by which the gain is larger than stated", share=0.02, low=-0.95),
+    "scale_error": ServoParameter("1", "share by which commands are larger than stated", share=0.005, low=-0.95),
+    "zero": ServoParameter("rad", "zero of the commands, of positions", of="angle", share=1.0, low=-np.pi, high=np.pi),
+    "bias": ServoParameter("N m", "constant torque of the joint", of="torque", low=NEGATIVE),
     "Mg": ServoParameter("N m", "gravity of the link beyond the file's, along the sine", of="torque", low=NEGATIVE),
     "Fo": ServoParameter("N m", "further Coulomb friction while torque is off", of="torque", low=NEGATIVE),
     "Fst": ServoParameter("N m", "Stribeck friction: what friction near standstill has above that of sliding", of="torque"),
@@ -97,7 +102,7 @@ SERVO_PARAMETERS: dict[str, ServoParameter] = {
 }
 """All parameters that a servo may have."""
 
-FURTHER = ("lead", "dead_band", "backlash", "Mg", "Fo")
+FURTHER = ("lag", "lead", "dead_band", "backlash", "gain_error", "scale_error", "zero", "bias", "Mg", "Fo")
 """Parameters that are found where that is asked for."""
 
 

@@ -8,7 +8,6 @@ import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
 from idbench.identify.arrays import Array
-from idbench.identify.servo.closed_loop import Servo
 from idbench.identify.servo.run import ServoRun
 
 CUTOFF = 1 / 12
@@ -42,16 +41,17 @@ def smoothed(t: Array, q: Array, cutoff: float = CUTOFF) -> tuple[Array, Array, 
     return smooth, speed, acceleration
 
 
-def corrected(t: Array, simulated: Array, measured: Array) -> tuple[Array, Array, Array]:
-    """Return positions, velocities and accelerations of a simulated motion, shape (time,), corrected by the measured one.
+def corrected(fine: Array, simulated: Array, t: Array, measured: Array) -> tuple[Array, Array, Array]:
+    """Return positions, velocities and accelerations of a simulated motion, corrected by the measured one, shape (fine,).
 
-    The residual is added below `DRIFT_CUTOFF`. Jolts, which encoder counts hide, come from the simulation, drift from neither.
+    Simulated positions are at fine times, measured ones at those of a log. The residual is added below `DRIFT_CUTOFF`. Jolts,
+    which encoder counts hide, come from the simulation, drift from neither.
     """
-    steps = np.diff(t)
+    steps = np.diff(fine)
     acceleration = np.diff(np.diff(simulated) / steps) / ((steps[1:] + steps[:-1]) / 2)
-    motion = (simulated, np.gradient(simulated, t), np.pad(acceleration, 1, mode="edge"))
-    lacking = smoothed(t, (measured - simulated)[:, None], DRIFT_CUTOFF)
-    q, qd, qdd = (x + y[:, 0] for x, y in zip(motion, lacking, strict=True))
+    motion = (simulated, np.gradient(simulated, fine), np.pad(acceleration, 1, mode="edge"))
+    lacking = smoothed(t, (measured - np.interp(t, fine, simulated))[:, None], DRIFT_CUTOFF)
+    q, qd, qdd = (x + np.interp(fine, t, y[:, 0]) for x, y in zip(motion, lacking, strict=True))
     return q, qd, qdd
 
 
@@ -63,6 +63,9 @@ RATES = 10
 
 DECIMATION = max(1, int(0.25 / CUTOFF))  # rows at twice the rate that the band of the smoothing needs
 
+LIGHTEST = 1e-6
+"""Inertia of a rotor of which rows show none, per torque: a search in shares of it could not leave zero."""
+
 COLUMNS = ("a", "b", "Ia", "Fs", "offset")
 
 
@@ -72,28 +75,29 @@ class ServoRows:
 
     Parameters
     ----------
-    servo : Servo
-        What is known.
     runs : sequence of ServoRun
         What was logged.
     held : mapping of str to float
         Parameters that are known.
     """
 
-    def __init__(self, servo: Servo, runs: Sequence[ServoRun], held: Mapping[str, float]) -> None:
-        self._held = {COLUMNS.index(name): x for name, x in held.items() if name in COLUMNS[:-1]}
-        self.servo, self._runs = servo, [_Uniform(run) for run in runs]
+    def __init__(self, runs: Sequence[ServoRun], held: Mapping[str, float]) -> None:
+        own = [name for name in COLUMNS[:-1] if name != "b" or "Fv" in held]  # the column of b has all damping
+        self._held = {COLUMNS.index(name): held[name] + (held["Fv"] if name == "b" else 0.0) for name in own if name in held}
+        self._known = dict(held)
+        self._runs = [_Uniform(run) for run in runs]
         self.fast = max(run.fast for run in self._runs)
 
     def starts(self) -> list[dict[str, float]]:
         """Return parameters for each delay and rate limit that is tried, those whose rows fit best first."""
-        rates = [np.inf, *(self.fast * np.geomspace(0.5, 1.3, RATES)).tolist()] if self.fast else [np.inf]
+        limited = self.fast and any(run.run.servo.kind == "duty" for run in self._runs)
+        rates = [np.inf, *(self.fast * np.geomspace(0.5, 1.3, RATES)).tolist()] if limited else [np.inf]
         found = [pair for rate in rates for pair in self._of_rate(rate)]
         return [p for _, p in sorted(found, key=lambda pair: pair[0])]
 
     def _of_rate(self, rate: float) -> list[tuple[float, dict[str, float]]]:
         """Return residual and parameters for each delay, targets keeping within a rate [rad/s]."""
-        driven = np.concatenate([run.driven(self.servo, rate) for run in self._runs])
+        driven = np.concatenate([run.driven(rate) for run in self._runs])
         motion, Y = (np.concatenate(x) for x in zip(*[run.motion for run in self._runs], strict=True))
         found = []
         for k, delay in enumerate(DELAYS.tolist()):
@@ -112,9 +116,10 @@ class ServoRows:
             return None
         p = dict(zip(COLUMNS, X.tolist(), strict=True))
         p |= {"offset": p["offset"] / p["a"], "delay": delay, "rate": float(rate)}
-        p["b"] = max(p["b"], 0.02 * p["a"])
+        known, least = self._known.get("b"), 0.02 * p["a"] * self._runs[0].run.servo.supply
+        p["b"], p["Fv"] = (max(p["b"], least), 0.0) if known is None else (known, max(p["b"] - known, 0.0))
         # Rotors that stop within half a sample look like none; a search could not leave that.
-        p["Ia"] = max(p["Ia"], 0.02 * self._runs[0].inertia, p["b"] * self._runs[0].T / 2)
+        p["Ia"] = max(p["Ia"], 0.02 * self._runs[0].inertia, p["b"] * self._runs[0].T / 2, LIGHTEST * p["a"])
         p["Fs"] = max(p["Fs"], 0.0)
         return float(np.mean((Y - W @ X) ** 2)), p
 
@@ -128,30 +133,29 @@ class _Uniform:
         self._t = np.arange(run.t[0], run.t[-1], self.T)
         q = np.interp(self._t, run.t, run.clean)
         self.q, self._measured = low_passed(q), q
-        qd = np.gradient(self.q, self.T)
+        self._speed = qd = np.gradient(self.q, self.T)
         qdd = np.gradient(qd, self.T)
         self._on = np.interp(self._t, run.t, run.enabled.astype(float))
         driven = np.abs(qd[self._on > 0])
         self.fast = float(np.quantile(driven, 0.995)) if driven.size else 0.0
-        inertia, sine, cosine, rest = (
-            np.interp(self._t, run.t, np.broadcast_to(getattr(run.load, x), run.t.shape))
-            for x in ("inertia", "sine", "cosine", "rest")
-        )
+        inertia, sine, cosine, rest, *_ = run.load.over(self._t)
         self.inertia = float(inertia.mean())
         needed = inertia * qdd + sine * np.sin(self.q) + cosine * np.cos(self.q) + rest
         columns = np.stack([-self._on * qd, -qdd, -np.sign(qd), needed], axis=1)
         filtered = low_passed(columns)[::DECIMATION]
         self.motion = filtered[:, :-1], filtered[:, -1]
 
-    def driven(self, servo: Servo, rate: float) -> Array:
+    def driven(self, rate: float) -> Array:
         """Return the columns of a and of the offset for each delay, shape (time, delay, 2)."""
         from idbench.identify.servo.servo_step import targets
 
-        run = self.run
+        run, servo = self.run, self.run.servo
         target = targets(np.interp(self._t, run.t, run.command), rate, self.T)
         late = np.interp(self._t[:, None] - DELAYS, self._t, target)
-        duty = servo.gain * run.kp * (late - self._measured[:, None])
-        inside = np.abs(duty) < servo.duty_limit
+        duty = servo.slope * (late - self._measured[:, None]) - servo.kd * self._speed[:, None]
+        if run.forward is not None:
+            duty += np.interp(self._t[:, None] - DELAYS, self._t, np.interp(self._t, run.t, run.forward))
+        inside = np.abs(duty) < servo.limit
         V = (self._on * servo.supply)[:, None]
-        limited = np.clip(duty, -servo.duty_limit, servo.duty_limit)
-        return low_passed(np.stack([V * limited, V * servo.gain * run.kp * inside], axis=2))[::DECIMATION]
+        limited = np.clip(duty, -servo.limit, servo.limit)
+        return low_passed(np.stack([V * limited, V * servo.slope * inside], axis=2))[::DECIMATION]

@@ -9,7 +9,17 @@ import numpy.typing as npt
 from scipy.ndimage import median_filter
 
 from idbench.identify.arrays import Array, frozen
+from idbench.identify.data.jumps import encoder_steps
 from idbench.identify.errors import LogError, SettingError, require_positive
+from idbench.identify.servo.law import Servo
+
+PARTS = ("inertia", "sine", "cosine", "rest", "lightness", "shaking")
+"""Of a load."""
+
+
+def _none() -> Array:
+    return frozen(np.zeros(()))
+
 
 G = 9.81
 """Gravity of a pendulum on a bench [m/s^2]."""
@@ -32,12 +42,20 @@ class JointLoad:
     """Torque per cosine of the joint's angle [N m], shape (time,) or ()."""
     rest: Array
     """Torque that does not depend on the angle [N m], shape (time,) or ()."""
+    lightness: Array = field(default_factory=_none)
+    """Of a simulation (see `TimeSteps`): diagonal of the inverse mass matrix of all joints [1/(kg m^2)], shape (time,)."""
+    shaking: Array = field(default_factory=_none)
+    """Of a simulation: acceleration by which its dry friction sees the damping of other joints [rad/s^2], shape (time,)."""
+    t: Array | None = None
+    """Times [s], on the clock of the log, shape (time,); None of a load that is constant."""
 
     def __post_init__(self) -> None:
-        for name in ("inertia", "sine", "cosine", "rest"):
+        for name in PARTS:
             values = frozen(getattr(self, name))
             if values.ndim > 1 or not np.isfinite(values).all():
                 raise SettingError(f"{name} of a load must be finite numbers, of the shape (time,) or one number")
+            if values.ndim and (self.t is None or len(self.t) != len(values)):
+                raise SettingError(f"{name} of a load varies: give its times")
             object.__setattr__(self, name, values)
         if (self.inertia < 0).any():
             raise SettingError(f"inertia = {self.inertia.min():g} kg m^2 of a load must not be negative")
@@ -56,9 +74,17 @@ class JointLoad:
         none = np.array(0.0)
         return cls(np.array(mass * length**2), np.array(mass * G * length), none, none)
 
-    def torque(self, q: Array) -> Array:
-        """Return the torque that keeps the joint at q [rad] while the others move as measured [N m]."""
-        return np.asarray(self.sine * np.sin(q) + self.cosine * np.cos(q) + self.rest)
+    def over(self, t: Array) -> tuple[Array, ...]:
+        """Return its parts at some times [s], each of their shape."""
+        return tuple(
+            np.interp(t, self.t, x) if x.ndim and self.t is not None else np.broadcast_to(x, np.shape(t))
+            for x in (getattr(self, name) for name in PARTS)
+        )
+
+    def torque(self, t: Array, q: Array) -> Array:
+        """Return the torque that keeps the joint at q [rad] at times t [s] while the others move as measured [N m]."""
+        _, sine, cosine, rest, *_ = self.over(t)
+        return np.asarray(sine * np.sin(q) + cosine * np.cos(q) + rest)
 
 
 MIN_SAMPLES = 20
@@ -104,18 +130,21 @@ class ServoRun:
     """Commanded position from each sample on [rad], shape (time,)."""
     load: JointLoad
     """What the joint carries."""
-    kp: float
-    """Gain of the firmware, in its own unit."""
+    servo: Servo
+    """What is known of the loop."""
     on: npt.NDArray[np.bool_] | None = None
     """Whether torque is enabled; by default always, shape (time,)."""
     voltage: Array | None = None
     """Supply [V], where it was logged, shape (time,)."""
+    forward: Array | None = None
+    """What is commanded beside the angle: duty, torque [N m] or current [A] from each sample on, shape (time,)."""
+    range: tuple[float, float] = (-np.inf, np.inf)
+    """Smallest and largest angle of the joint in its robot's file [rad]."""
     name: str = field(default="the log", kw_only=True)
     """What messages call the run."""
 
     def __post_init__(self) -> None:
-        require_positive(kp=self.kp)
-        for name in ("t", "q", "command", "voltage"):
+        for name in ("t", "q", "command", "voltage", "forward"):
             if (values := getattr(self, name)) is not None:
                 object.__setattr__(self, name, self._checked(name, frozen(values)))
         on = np.ones(len(self.t), dtype=bool) if self.on is None else np.array(self.on, dtype=bool)
@@ -148,9 +177,25 @@ class ServoRun:
         return float(np.median(np.diff(self.t)))
 
     @cached_property
+    def step(self) -> float:
+        """Step of the logged positions [rad]: that of the firmware's encoder, or as they show it; 0: they are not rounded."""
+        return self.servo.count or float(np.nan_to_num(encoder_steps(self.q[:, None])[0]))
+
+    @cached_property
+    def still(self) -> float:
+        """Angle up to which a joint is at rest [rad]: a count of its encoder, or a share of its motion where it has none."""
+        return self.step or STILL * float(np.ptp(self.clean))
+
+    @cached_property
     def read_well(self) -> npt.NDArray[np.bool_]:
         """Whether each position can be one, shape (time,): spikes of the bus come back at once, joints do not."""
         return well_read(self.q)
+
+    @property
+    def offsets(self) -> tuple[float, float]:
+        """Smallest and largest offset with which all angles of the file are within the range of the joint [rad]."""
+        low, high = self.range[0] - float(self.clean.min()), self.range[1] - float(self.clean.max())
+        return (low, high) if low < high else (-np.inf, np.inf)  # a joint beyond its range: the range is not to be believed
 
     @cached_property
     def clean(self) -> Array:
@@ -167,23 +212,24 @@ AFTER = 0.05
 SHORTEST = 0.8
 """Least length of a piece [s]."""
 
+STILL = 1e-3
+"""Share of the range of a motion that stands for a count where positions are not rounded: 1000 in a range, as of 10 bits."""
+
 MOVES = 4
 """Counts by which a joint moves in a piece that says anything."""
 
 
-def pieces(run: ServoRun, step: float, delay: float) -> list[ServoRun]:
+def pieces(run: ServoRun, delay: float) -> list[ServoRun]:
     """Return a run in pieces that begin at rest, the target of the firmware where the command is.
 
     Parameters
     ----------
     run : ServoRun
         What was logged.
-    step : float
-        Of the encoder [rad]; a position that flickers by one still rests.
     delay : float
         By which commands may be late [s].
     """
-    rest = REST + delay
+    rest, step = REST + delay, run.still
     t, first = run.t, np.searchsorted(run.t, run.t - rest)
     last = np.searchsorted(run.t, run.t + AFTER, side="right")
     still = np.array([_rests(run, slice(i, k), step) for i, k in zip(first, last, strict=True)])
@@ -215,12 +261,5 @@ def _rests(run: ServoRun, some: slice, step: float) -> bool:
 
 
 def _part(run: ServoRun, some: slice) -> ServoRun:
-    load = JointLoad(*(_of(x, some) for x in (run.load.inertia, run.load.sine, run.load.cosine, run.load.rest)))
-    voltage = None if run.voltage is None else run.voltage[some]
-    return replace(
-        run, t=run.t[some], q=run.q[some], command=run.command[some], on=run.enabled[some], voltage=voltage, load=load
-    )
-
-
-def _of(x: Array, some: slice) -> Array:
-    return x[some] if x.ndim else x
+    names = ("t", "q", "command", "on", "voltage", "forward")
+    return replace(run, **{name: x[some] for name in names if (x := getattr(run, name)) is not None})

@@ -13,7 +13,7 @@ from scipy.special import ndtri
 
 from idbench.identify.arrays import Array
 from idbench.identify.nuisances import Nuisances
-from idbench.identify.servo.closed_loop import ServoLoop
+from idbench.identify.servo.closed_loop import STATES, ServoLoop
 from idbench.identify.servo.parameters import SERVO_PARAMETERS, limits_of, step_of
 
 DAMPINGS = 10.0 ** np.arange(-2.0, 4.0)
@@ -37,6 +37,9 @@ WORST, RISES = 2, (0.1, 0.4, 1.6)
 UNSEEN = 1e-6
 """Curvature of an axis, of those scaled to 1, up to which nothing shows along it."""
 
+AHEAD = 3.0
+"""Counts by which the beginning of a run may be off."""
+
 WILD = 4.0
 """Times its typical size from which on the sensitivity of a sample counts less: of motions that depend on a hair."""
 
@@ -44,18 +47,18 @@ WILD = 4.0
 @final
 @dataclass(frozen=True, eq=False)
 class Beginning:
-    """Where runs begin: the encoder says that to a count, and where torque is off nothing makes a run forget it."""
+    """How runs begin: the encoder says that to a count, and where torque is off nothing makes a run forget it."""
 
     ahead: Array
-    """Beyond the position that was measured [rad], shape (run,)."""
+    """Beside what was measured (see `Begin`) [rad], shape (run, 3)."""
     sensitivity: Array
-    """Of the simulated positions to it, shape (run, sample)."""
+    """Of the simulated positions to it, shape (run, sample, 3)."""
     certainty: float
     """Variance of residuals over that of a position that was rounded."""
 
     def weighted(self, w: Array) -> Nuisances:
         """Return other beginnings as unknowns of runs whose samples have weights w, shape (run, sample)."""
-        return Nuisances(self.sensitivity[..., None], self.certainty, w)
+        return Nuisances(self.sensitivity, self.certainty, w)
 
 
 @final
@@ -96,16 +99,18 @@ class ServoSearch:
         self.free = tuple(free)
         self._scales = dict(scales)
         self.c = c
-        self._count = loop.servo.step
+        self._count = loop.step or c / 3  # where positions are exact, runs begin as near as they follow
         # Residuals are a third of c in the median; a rounded position is off by its twelfth.
         self._certainty = float((c / 3 / MEDIAN) ** 2 / (self._count**2 / 12))
-        self._low, self._high = limits_of(self.free)
+        self._low, self._high = loop.limits(limits_of(self.free), self.free)
         self._relative = np.array([SERVO_PARAMETERS[name].relative > 0 for name in self.free], dtype=bool)
 
     def cost(self, q: Array, ahead: Array | float = 0.0) -> Array:
-        """Return the objective of simulated positions, shape (lane,), of runs that begin ahead, shape (lane, run)."""
+        """Return the objective of simulated positions, shape (lane,), of runs that begin ahead, shape (lane, run, 3)."""
         r = np.abs(self._loop.q - q) * self._loop.kept / self.c
-        total = 2 * self.c**2 * (r - np.log1p(r)).sum(axis=(1, 2)) + self._certainty * np.square(ahead).sum(axis=-1)
+        total = 2 * self.c**2 * (r - np.log1p(r)).sum(axis=(1, 2)) + self._certainty * (
+            np.square(ahead).sum(axis=(-2, -1)) if np.ndim(ahead) else 0.0
+        )
         return np.nan_to_num(total, nan=np.inf, posinf=np.inf)
 
     def cost_of(self, p: Mapping[str, float]) -> float:
@@ -118,7 +123,7 @@ class ServoSearch:
         Levenberg and Marquardt, x(k+1) = x(k) - (J' J + mu D)^-1 J' r, initial positions eliminated (Schur complement);
         several mu, and samples about the step, are simulated at once, and the best of all is x(k+1).
         """
-        x, ahead = np.array([start[name] for name in self.free]), np.zeros(len(self._loop.runs))
+        x, ahead = np.array([start[name] for name in self.free]), np.zeros((len(self._loop.runs), STATES))
         width = 1.0
         damping = 1e-2
         idle = 0
@@ -130,7 +135,7 @@ class ServoSearch:
             steps, promised = self._steps(normal, damping), float(normal.gradient @ normal.inverse @ normal.gradient)
             scattered = self._scattered(rng, normal, spread * np.sqrt(0.02 * cost[0] / len(x)))
             more = self._within(x, np.concatenate([steps, scattered]))
-            begins = np.clip(ahead + normal.begin(more - x), -self._count, self._count)
+            begins = np.clip(ahead + normal.begin(more - x), -AHEAD * self._count, AHEAD * self._count)
             further = self.cost(self._simulated(start, more, begins), begins)
             every, costs = np.concatenate([tried, more]), np.concatenate([cost, further])
             best = int(costs.argmin())
@@ -193,13 +198,15 @@ class ServoSearch:
         lower = np.maximum(x - np.diag(h), self._low)
         n = len(x)
         tried, half = np.concatenate([x[None], upper, lower]), self._count / 2
-        begins = np.concatenate([np.repeat(ahead[None], len(tried), axis=0), [ahead + half, ahead - half]])
-        q = self._simulated(start, np.concatenate([tried, [x, x]]), begins)
+        sides = half * np.concatenate([np.eye(STATES), -np.eye(STATES)])[:, None, :]
+        begins = np.concatenate([np.repeat(ahead[None], len(tried), axis=0), ahead + sides])
+        q = self._simulated(start, np.concatenate([tried, np.repeat(x[None], 2 * STATES, axis=0)]), begins)
         wide, kept = np.diagonal(upper - lower), self._loop.kept
         wide = np.where(wide > 0, wide, np.inf)  # what has come to zero, in steps of shares of itself, has no effect
         J = np.moveaxis(q[1 : n + 1] - q[n + 1 : 2 * n + 1], 0, -1) / wide * kept[..., None]
-        beginning = Beginning(ahead, (q[-2] - q[-1]) / self._count * kept, self._certainty)
-        return tried, self.cost(q[:-2], ahead), J, (self._loop.q - q[0]) * kept, beginning
+        apart = np.moveaxis(q[-2 * STATES : -STATES] - q[-STATES:], 0, -1) / self._count
+        beginning = Beginning(ahead, apart * kept[..., None], self._certainty)
+        return tried, self.cost(q[: -2 * STATES], ahead), J, (self._loop.q - q[0]) * kept, beginning
 
     def _normal(self, J: Array, r: Array, beginning: Beginning) -> "_Normal":
         w = 1 / (1 + np.abs(r) / self.c)
@@ -230,15 +237,15 @@ class _Normal:
     def __init__(self, J: Array, r: Array, w: Array, beginning: Beginning) -> None:
         begins, p = beginning.weighted(w), J.shape[-1]
         known = np.concatenate([J, r[..., None]], axis=-1)
-        follow, free = begins.following(known)[:, 0], begins.without(known).reshape(-1, p + 1)
+        follow, free = begins.following(known), begins.without(known).reshape(-1, p + 1)
         both = (J * w[..., None]).reshape(-1, p).T @ free
-        self._follow, self._pull = follow[:, :p], follow[:, p] - begins.drawn(beginning.ahead[:, None])[:, 0]
+        self._follow, self._pull = follow[..., :p], follow[..., p] - begins.drawn(beginning.ahead)
         A = both[:, :p]
         self.size = np.sqrt(np.maximum(np.diagonal(A), 1e-24))
         self.A = A / np.outer(self.size, self.size)
-        self.gradient = (both[:, p] + beginning.certainty * follow[:, :p].T @ beginning.ahead) / self.size
+        self.gradient = (both[:, p] + beginning.certainty * np.einsum("rkp,rk->p", self._follow, beginning.ahead)) / self.size
         self.inverse = np.linalg.pinv(self.A, 1e-6, hermitian=True)
 
     def begin(self, steps: Array) -> Array:
-        """Return how far beginnings move with steps of the parameters, shape (lane, parameter), as (lane, run)."""
-        return np.asarray(self._pull - steps @ self._follow.T)
+        """Return how far beginnings move with steps of the parameters, shape (lane, parameter), as (lane, run, 3)."""
+        return np.asarray(self._pull - np.einsum("lp,rkp->lrk", steps, self._follow))

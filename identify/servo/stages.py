@@ -1,172 +1,21 @@
 """The stages of a servo's identification: from rows to the closed loop, with more parameters and in finer steps."""
 
 from collections.abc import Mapping, Sequence
-from itertools import product
+from dataclasses import replace
 from typing import Self, final
 
 import numpy as np
 
 from idbench.identify.errors import ExcitationError, IdentificationError
-from idbench.identify.servo.closed_loop import Servo, ServoLoop, count_of
+from idbench.identify.servo.closed_loop import ServoLoop, count_of
 from idbench.identify.servo.excitation import Excitation
-from idbench.identify.servo.fit import OTHER_SCALE, TORQUES, ServoFit, require_explained, require_possible, require_scale
+from idbench.identify.servo.fit import ServoFit, require_possible
 from idbench.identify.servo.parameters import FURTHER, SERVO_FRICTIONS, SERVO_PARAMETERS, first_of, parameters_of
 from idbench.identify.servo.rows import ServoRows
 from idbench.identify.servo.run import ServoRun, pieces
-from idbench.identify.servo.search import SETTLED, Found, ServoSearch
+from idbench.identify.servo.search import Found, ServoSearch
+from idbench.identify.servo.valleys import Valleys
 from idbench.identify.telling import one_thread
-
-SHAKEN = 2
-"""Times that a search leaves its valley for others, at most."""
-
-SCALES = (0.7, 1.0, 1.4)
-"""Factors on all torques that are tried from there."""
-
-ROTORS = (0.25, 1.0, 4.0)
-"""Further factors on the armature that are tried."""
-
-LATER = (-2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0)
-"""Changes of the delay that are tried [samples]."""
-
-VALLEYS = 3
-"""Other valleys that are searched."""
-
-ESCAPED = 0.01
-"""Share by which another valley must be better."""
-
-ASIDE = 8
-"""Rounds in another valley of the last stage, at most."""
-
-NEAR = 1.1, 1.03
-"""Factors on all torques by which the last stage goes along the valley."""
-
-NARROW = 3.0
-"""Contrast below which it does: the valley is so long there that a search of all parameters ended 5 % from the best scale."""
-
-REFINED = 15
-"""Rounds of the last stage, at most."""
-
-
-@final
-class Valleys:
-    """Searches that leave the valley where they are, if another one is deeper.
-
-    Parameters
-    ----------
-    coarse : ServoLoop
-        Runs in coarse steps, in which other valleys are looked for.
-    excitation : Excitation
-        What the runs can show.
-    held : mapping of str to float
-        Parameters that are known.
-    """
-
-    def __init__(self, coarse: ServoLoop, excitation: Excitation, held: Mapping[str, float]) -> None:
-        self._coarse = coarse
-        self._excitation = excitation
-        self._held = dict(held)
-
-    def from_start(self, p: Mapping[str, float], free: Sequence[str]) -> Found:
-        """Return p = argmin cost in coarse steps, again from shaken starts, until cost(k+1) > (1 - ESCAPED) cost(k)."""
-        found = self._search(self._coarse, p, free).best(p)
-        for _ in range(SHAKEN):
-            search = self._search(self._coarse, found.p, free)
-            best = min((search.best(other) for other in self._shaken(search, found.p)), key=lambda other: other.cost)
-            if best.cost > (1 - ESCAPED) * search.at(found).cost:
-                break
-            found = best
-        return found
-
-    def refined(self, loop: ServoLoop, p: Mapping[str, float], free: Sequence[str], many: bool) -> tuple[Found, float]:
-        """Return what is found in the steps of a loop, and its contrast (see `ServoFit`)."""
-        found = self._search(loop, p, free).best(p, REFINED)
-        if "a" not in free:
-            return found if many else self._better(loop, free, found), np.inf
-        if many:  # on a real bench, a scale that fitted 1 % better predicted another mass 8 % worse
-            return found, self._scaled(free, found.p)[1]
-        found, contrast = self._of_scale(loop, free, self._better(loop, free, found))
-        return self._along(loop, free, found) if contrast < NARROW else found, contrast
-
-    def at(self, loop: ServoLoop, found: Found, free: Sequence[str]) -> Found:
-        """Return residuals and sensitivities in another loop."""
-        return self._search(loop, found.p, free).at(found)
-
-    def _shaken(self, search: ServoSearch, p: dict[str, float]) -> list[dict[str, float]]:
-        """Return the best of parameters in other valleys: a rotor that is light looks like a command that is late."""
-        base = {**p, "Ia": max(p["Ia"], p["b"] * self._excitation.T / 2)}
-        T, held = self._excitation.T, self._held
-        tried = []
-        for scale, Ia, delay, offset in product(SCALES, ROTORS, LATER, (base["offset"], 0.0)):
-            torques = {name: x * scale for name, x in base.items() if name in TORQUES}
-            late = max(base["delay"] + delay * T, 0.0)
-            tried.append({**base, **torques, "Ia": base["Ia"] * Ia, "delay": late, "offset": offset, **held})
-        tried = [dict(each) for each in {tuple(other.items()): None for other in tried} if dict(each) != base]
-        lanes = {name: np.array([x[name] for x in tried]) for name in base}
-        order = np.argsort(search.cost(self._coarse.simulate(lanes)))[:VALLEYS]
-        return [tried[int(k)] for k in order]
-
-    def _better(self, loop: ServoLoop, free: Sequence[str], found: Found) -> Found:
-        """Return the best of searches from p +- sigma v, v the worst known axes, while cost(k+1) < (1 - ESCAPED) cost(k)."""
-        for _ in range(SHAKEN):
-            search = self._search(loop, found.p, free)
-            tried = search.away(found)
-            cost = search.cost(loop.simulate({name: np.array([x[name] for x in tried]) for name in tried[0]}))
-            best = min((search.best(tried[int(k)], ASIDE) for k in np.argsort(cost)[:VALLEYS]), key=lambda other: other.cost)
-            if best.cost > (1 - ESCAPED) * search.at(found).cost:
-                break
-            found = best
-        return found
-
-    def _along(self, loop: ServoLoop, free: Sequence[str], found: Found) -> Found:
-        """Return the best along p(f) = f p, f of all torques: in a narrow valley a search of all parameters ends early."""
-        search = self._search(loop, found.p, free)
-        others = ServoSearch(loop, [name for name in free if name != "a"], self._excitation.scales, search.c)
-        best, cost = found.p, search.at(found).cost
-        for factor in (near**sign for near in NEAR for sign in (1, -1)):
-            while (other := others.best(self._times(factor, free, best), ASIDE)).cost < (1 - SETTLED) * cost:
-                best, cost = other.p, other.cost
-        return found if best is found.p else search.best(best, REFINED)
-
-    def _of_scale(self, loop: ServoLoop, free: Sequence[str], found: Found) -> tuple[Found, float]:
-        """Return the best of searches from p(f) = f p, and the contrast min_f cost(f p) / cost(p) (see `ServoFit`)."""
-        scaled, contrast = self._scaled(free, found.p)
-        for _ in range(SHAKEN):
-            if contrast > 1 - ESCAPED:
-                break
-            search = self._search(loop, scaled, free)
-            other = search.best(scaled, REFINED)
-            if other.cost > (1 - ESCAPED) * search.at(found).cost:
-                break
-            found = other
-            scaled, contrast = self._scaled(free, found.p)
-        return found, contrast
-
-    def _scaled(self, free: Sequence[str], p: Mapping[str, float]) -> tuple[dict[str, float], float]:
-        """Return the best parameters with another torque per volt, and how many times larger they make the objective."""
-        search = self._search(self._coarse, p, free)
-        others = ServoSearch(self._coarse, [name for name in free if name != "a"], self._excitation.scales, search.c)
-        starts = [self._times(factor, free, p) for factor in (OTHER_SCALE, 1 / OTHER_SCALE)]
-        best = min((others.best(start, ASIDE) for start in starts), key=lambda other: other.cost)
-        return best.p, best.cost / search.best(p, ASIDE).cost
-
-    def _times(self, factor: float, free: Sequence[str], p: Mapping[str, float]) -> dict[str, float]:
-        """Return parameters with torques of another scale; where gravity is free, it and the armature make up for the load."""
-        scaled = {**p, **{name: p[name] * factor for name in TORQUES if name in free}}
-        if "Flq" in free:
-            scaled["Flq"] = p["Flq"] / factor
-        if "Mg" in free:
-            J, sine = (
-                float(np.mean([np.mean(getattr(run.load, x)) for run in self._coarse.runs])) for x in ("inertia", "sine")
-            )
-            scaled["Mg"] = factor * (p["Mg"] + sine) - sine
-            scaled["Ia"] = max(factor * (p["Ia"] + J) - J, 0.1 * p["Ia"]) if "Ia" in free else p["Ia"]
-        return scaled
-
-    def _search(self, loop: ServoLoop, begin: Mapping[str, float], free: Sequence[str]) -> ServoSearch:
-        r = np.abs(loop.q - loop.simulate(begin)[0])[loop.kept]
-        c = 3 * max(float(np.median(r)), loop.servo.step / 4)
-        return ServoSearch(loop, free, self._excitation.scales, c)
-
 
 TRIED = 48
 """Starts of the rows that are simulated."""
@@ -186,6 +35,12 @@ MEDIUM = 0.2
 FINE = 0.1
 """Longest step of the last stage with pieces."""
 
+MISLED = 0.2
+"""Mean residual of a start, over the range of the motion, from which on commands are tried with the other sign."""
+
+STEP = 1e-3
+"""Shortest step of the last stage [s]: a tenth of the sampling time of 100 Hz, at which the benches were identified."""
+
 PLAYS = np.array([0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0])
 """Backlash that is tried first [counts]."""
 
@@ -196,96 +51,137 @@ class Stages:
 
     Parameters
     ----------
-    servo, runs, held
+    runs, held
         As for `identify_servo`.
     start : mapping of str to float
         Parameters of the first stage.
+    cut : bool
+        Whether runs are cut where the joint rests; they have been if not.
     """
 
-    def __init__(self, servo: Servo, runs: Sequence[ServoRun], held: dict[str, float], start: Mapping[str, float]) -> None:
-        self.held = held
-        self._servo = servo
-        self._excitation = Excitation.of(servo, runs, held)
-        self.start, self._few = dict(start), len(_evenly(runs)) <= FEW
-        self._whole = looked_at(servo, runs, self.start["delay"])
-        self._coarse = ServoLoop(servo, self._whole if self._few else self._whole[::2], COARSE * self._excitation.T)
-        self._valleys = Valleys(self._coarse, self._excitation, held)
+    def __init__(self, runs: Sequence[ServoRun], held: dict[str, float], start: Mapping[str, float], cut: bool = True) -> None:
+        self._excitation = Excitation.of(runs, held)
+        self.held = held if self._excitation.loaded else {"a": 1.0} | held
+        self.start, self._few = dict(start), len(_evenly(runs)) <= FEW or not cut
+        self._whole = looked_at(runs, self.start["delay"]) if cut else list(runs)
+        self._simulated = self._whole[0].servo.steps.step  # of a simulation, whose steps are then ours
+        coarse = self._simulated or max(COARSE * self._excitation.T, 2 * STEP)
+        self._coarse = ServoLoop(self._whole if self._few else self._whole[::2], coarse)
+        self._valleys = Valleys(self._coarse, self._excitation, self.held)
 
     @classmethod
-    def begun(cls, servo: Servo, runs: Sequence[ServoRun], more: Sequence[str], held: dict[str, float]) -> Self:
+    def begun(cls, runs: Sequence[ServoRun], more: Sequence[str], held: dict[str, float]) -> Self:
         """Return stages that begin with the start of the rows whose simulation fits best."""
         require_possible(held)
-        excitation, some = Excitation.of(servo, runs, held), _evenly(runs)
+        held = {name: x for name, x in runs[0].servo.held.items() if name not in more} | held if runs else held
+        excitation, some = Excitation.of(runs, held), _evenly(runs)
         if "Fo" in more and not excitation.off:
             raise ExcitationError(f"{runs[0].name}: Fo is unidentifiable, because torque is never off in a motion")
         with one_thread():
-            return cls(servo, runs, held, _started(servo, some, held, excitation))
+            return cls(runs, held, _started(some, held if excitation.loaded else {"a": 1.0} | held, excitation))
 
     def go(self, friction: str, more: Sequence[str], p: Mapping[str, float]) -> dict[str, float]:
         """Return the parameters with a law of friction and further ones, from those of a simpler law."""
+        more = (*more, *self._usual)
         first = first_of(friction, p, self._excitation.speed) | dict.fromkeys(more, 0.0)
         begin = {**first, **p, **self.held}
         if "backlash" in more and "backlash" not in {**p, **self.held}:
-            begin["backlash"] = _play(self._servo, self._coarse, begin)
-        known = {*parameters_of(friction, more), *(name for name in self.held if name in FURTHER)}
+            begin["backlash"] = _play(self._coarse, begin)
+        known = {*parameters_of(friction, more), *(name for name in self.held if name in FURTHER), *self._usual}
         begin = {name: x for name, x in begin.items() if name in known}  # what is held may be of a further law
         free = self._free(friction, more, begin)
         with one_thread():
             return self._valleys.from_start(begin, free).p
 
+    def beside(self, free: tuple[str, ...], p: Mapping[str, float], tried: Sequence[str], rounds: int) -> dict[str, Found]:
+        """Return what is found in coarse steps with each of further parameters, and without (as "")."""
+        with one_thread():
+            found = {"": self._valleys.near(p, free, rounds)}
+            return found | {name: self._valleys.near({**p, name: 0.0}, (*free, name), rounds) for name in tried}
+
     def fit(self, friction: str, more: Sequence[str], p: dict[str, float]) -> ServoFit:
-        """Return the fit of all runs, in fine steps; raise IdentificationError if it explains nothing."""
+        """Return the fit of all runs, in fine steps."""
         return self.last(friction, self._free(friction, more, p), p)
 
-    def last(self, friction: str, free: tuple[str, ...], p: Mapping[str, float]) -> ServoFit:
-        """Return the fit of all runs with parameters that are free, in fine steps."""
-        step = (FINE if self._few else MEDIUM) * self._excitation.T
+    def last(
+        self,
+        friction: str,
+        free: tuple[str, ...],
+        p: Mapping[str, float],
+        contrasts: tuple[float, float] | None = None,
+    ) -> ServoFit:
+        """Return the fit of all runs with parameters that are free, in fine steps.
+
+        With contrasts (see `ServoFit`) that are known, from an earlier fit, no other valley is tried.
+        """
+        step = self._simulated or max((FINE if self._few else MEDIUM) * self._excitation.T, STEP)
         with one_thread():
-            loop = ServoLoop(self._servo, self._whole, step, count_of(self._servo, self._whole))
-            found, contrast = self._valleys.refined(loop, p, free, many=not self._few)
+            loop = ServoLoop(self._whole, step, count_of(self._whole))
+            if contrasts is None:
+                found, contrasts = self._valleys.refined(loop, p, free, many=not self._few)
+            else:
+                found = self._valleys.again(loop, p, free)
             # At rest, rounded positions change by a count or not at all: what parameters do to them shows without rounding.
-            exact = ServoLoop(self._servo, self._whole, step)
+            exact = ServoLoop(self._whole, step)
             unrounded = self._valleys.at(exact, found, free)
-            fit = ServoFit(self._servo, friction, free, unrounded, exact, self._excitation, contrast)
-            require_explained(fit)
-            require_scale(fit)
-        return fit
+        if not self._excitation.loaded:
+            contrasts = 1.0, 1.0
+        return ServoFit(friction, free, unrounded, exact, self._excitation, contrasts)
+
+    @property
+    def _usual(self) -> tuple[str, ...]:
+        """What is found of a loop of torques unasked: where gravity shows its zero, it shows a constant torque as well."""
+        return ("bias",) if self._whole[0].servo.kind == "torque" and self._excitation.tilts else ()
 
     def _free(self, friction: str, more: Sequence[str], begin: Mapping[str, float]) -> tuple[str, ...]:
         """Return the parameters that are searched for, in the order of `SERVO_PARAMETERS`."""
-        names = {"a", "b", "Ia", "Fs", "offset", "delay", *SERVO_FRICTIONS[friction], *more}
-        names |= {"Fv"} if self._excitation.off else set()
+        names = {"a", "b", "Ia", "Fs", "offset", "delay", *SERVO_FRICTIONS[friction], *more, *self._usual}
+        names |= {"Fv"} if self._excitation.off or "b" in self.held else set()
         names -= set() if self._excitation.tilts else {"offset"}
         names |= {"rate"} if "rate" in begin else set()
         return tuple(name for name in SERVO_PARAMETERS if name in names - set(self.held))
 
 
-def looked_at(servo: Servo, runs: Sequence[ServoRun], delay: float) -> list[ServoRun]:
+def looked_at(runs: Sequence[ServoRun], delay: float) -> list[ServoRun]:
     """Return runs, or their pieces, that a search looks at, commands being as late as its start says [s]."""
     whole = _evenly(runs)
-    return whole if len(whole) > FEW else [piece for run in whole for piece in pieces(run, servo.step, 1.5 * delay)]
+    return whole if len(whole) > FEW else [piece for run in whole for piece in pieces(run, 1.5 * max(delay, 0.0))]
 
 
-def _started(servo: Servo, runs: Sequence[ServoRun], held: dict[str, float], excitation: Excitation) -> dict[str, float]:
-    """Return the start of the rows whose simulation fits best."""
-    starts = ServoRows(servo, runs, held).starts()[:TRIED]
-    if not starts:
+def _started(runs: Sequence[ServoRun], held: dict[str, float], excitation: Excitation) -> dict[str, float]:
+    """Return the start of the rows whose simulation fits best; raise IdentificationError if the command has the other sign."""
+    best, cost = _best_start(runs, held, excitation)
+    turned = [replace(run, command=-run.command, forward=None if run.forward is None else -run.forward) for run in runs]
+    if cost > MISLED and _best_start(turned, held, excitation)[1] < cost / 2:
         raise IdentificationError(
-            f"{runs[0].name}: more duty does not make more torque in the direction of the command; has the command the "
-            "sign and the unit of the position, and is it the one that the servo received?"
+            f"{runs[0].name}: the joint follows its command with the other sign: turn the sign of the command, or of the "
+            "position and the joint's axis in the robot's file"
         )
-    loop = ServoLoop(servo, runs, COARSE * excitation.T)
-    lanes = {name: np.array([p[name] for p in starts]) for name in starts[0]} | {"Fv": np.zeros(len(starts))}
-    cost = ServoSearch(loop, (), excitation.scales, excitation.range / 10).cost(loop.simulate(lanes))
-    best = {**starts[int(cost.argmin())], "Fv": 0.0}
+    if not best:
+        raise IdentificationError(
+            f"{runs[0].name}: more duty does not make more torque in the direction of the command; is it the one that the "
+            "servo received, in the unit of the position?"
+        )
     if not np.isfinite(best["rate"]):
         del best["rate"]
     return {**best, "offset": best["offset"] * excitation.tilts, **held}
 
 
-def _play(servo: Servo, loop: ServoLoop, begin: dict[str, float]) -> float:
+def _best_start(runs: Sequence[ServoRun], held: dict[str, float], excitation: Excitation) -> tuple[dict[str, float], float]:
+    """Return the start of the rows that fits best, and its mean residual over the range; nothing if there is none."""
+    starts = ServoRows(runs, held).starts()[:TRIED]
+    if not starts:
+        return {}, np.inf
+    loop = ServoLoop(runs, runs[0].servo.steps.step or max(COARSE * excitation.T, 2 * STEP))
+    lanes = {name: np.array([p[name] for p in starts]) for name in starts[0]}
+    q = loop.simulate(lanes)
+    best = int(ServoSearch(loop, (), excitation.scales, excitation.range / 10).cost(q).argmin())
+    return dict(starts[best]), float(np.abs(loop.q - q[best])[loop.kept].mean()) / excitation.range
+
+
+def _play(loop: ServoLoop, begin: dict[str, float]) -> float:
     """Return the backlash of some that fits best: where there is none to begin with, its sensitivity is none."""
-    tried = servo.step * PLAYS
+    tried = loop.runs[0].still * PLAYS
     r = np.abs(loop.q - loop.simulate({name: np.full(len(tried), x) for name, x in begin.items()} | {"backlash": tried}))
     return float(tried[int((r * loop.kept).mean(axis=(1, 2)).argmin())])
 

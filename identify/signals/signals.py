@@ -101,6 +101,8 @@ class Signals:
         expect(self.differentiator, "derivative", self.s(q), q.shape)
         derivative, fs = self.differentiator.derivative, self.fs  # not self.s: a circle of references would outlive long pieces
         conditions = {name: np.swapaxes(x, -1, -2) for name, x in self.log.conditions.items()}
+        if self.log.poses:
+            return State(q, np.zeros_like(q), np.zeros_like, conditions)
         return State.of(q, lambda x: derivative(x, fs), conditions)
 
     @cached_property
@@ -115,7 +117,11 @@ class Signals:
         if self.weights_of is not None:
             return self.weights_of.weight
         weight = self.mask.suited(self.state.qd).weight(self.state.qd, self.fs)
-        return expect(self.mask, "weight", weight, self.state.q.shape)
+        weight = expect(self.mask, "weight", weight, self.state.q.shape)
+        if self.log.missing:
+            weight = weight.copy()
+            weight[..., list(self.log.missing), :] = 0.0
+        return weight
 
     def s(self, x: Array) -> Array:
         """Return dx/dt of `x`, shape (..., time)."""

@@ -107,7 +107,13 @@ def free_run(robot: Robot, log: MotionLog, qd: Array, length: float) -> tuple[Ar
 
 
 def shoot(
-    robot: Robot, vary: Mapping[str, npt.ArrayLike], q: Array, qd: Array, log: MotionLog, first: npt.ArrayLike, count: int
+    robot: Robot,
+    vary: Mapping[str, npt.ArrayLike],
+    states: tuple[Array, Array],
+    log: MotionLog,
+    first: npt.ArrayLike,
+    count: int,
+    disturbance: Array | None = None,
 ) -> Array:
     """Return the positions of robots that start somewhere in a log, shape (nsim, count, joint), NaN of those that run away.
 
@@ -117,16 +123,19 @@ def shoot(
         The robot.
     vary : mapping of str to array_like
         Fields of MuJoCo's model with a value for each simulation, shape (nsim, ...).
-    q, qd : Array, shape (nsim, joint)
-        States at their first sample [rad, rad/s].
+    states : tuple of Array, shape (nsim, joint)
+        Positions and velocities at their first sample [rad, rad/s].
     log : MotionLog
         One run; its torques act as its channel says.
     first : int array, shape (nsim,)
         First sample of each.
     count : int
         Number of samples, the first included.
+    disturbance : Array, shape (nsim, count, joint), optional
+        Torques beside those of the log [N m].
     """
-    found, broken = _driven(_start(robot, log, q, qd, Physics(step=STEP), vary, 0), np.asarray(first), count)
+    beside = None if disturbance is None else lambda k, _: disturbance[:, k]
+    found, broken = _driven(_start(robot, log, *states, Physics(step=STEP), vary, 0), np.asarray(first), count, beside)
     found[broken] = np.nan
     return found
 

@@ -56,7 +56,7 @@ class Mounting:
         if held and len(held) == len(names):
             raise RobotError("all joints are locked: nothing is left to identify")
         if held:
-            _forget(spec, set(held), names)
+            forget(spec, set(held), names)
         for joint in [joint for joint in spec.joints if joint.name in held]:
             _hold(spec, joint, held[joint.name])
         for name, weights in self.couplings:
@@ -164,7 +164,7 @@ def _rotated(quaternion: Array, vector: Array) -> Array:
     return found
 
 
-def _forget(spec: mujoco.MjSpec, held: set[str], names: Sequence[str]) -> None:
+def forget(spec: mujoco.MjSpec, held: set[str], names: Sequence[str]) -> None:
     """Take out what refers to joints that will be no more: ties, actuators, sensors, keyframes, entries of limits."""
     left = [j for j, name in enumerate(names) if name not in held]
     for numeric in [x for x in spec.numerics if x.name.startswith("max_") and len(x.data) == len(names) > 1]:

@@ -16,6 +16,7 @@ from idbench.sim.errors import RobotError
 from idbench.sim.robot.dh import TABLE
 from idbench.sim.robot.motors import Array
 from idbench.sim.robot.mounting import PLAIN, Mounting
+from idbench.sim.robot.opened import drop_ties, hold_bases
 from idbench.sim.robot.payload import without_missing_meshes
 from idbench.sim.robot.robot import Robot
 from idbench.sim.robot.tree import kinematic_tree, standard_parameters
@@ -123,6 +124,7 @@ def compiled(name: str, text: str, folder: Path | None = None) -> Robot:
         spec = mujoco.MjSpec.from_string(text)
         spec.modelfiledir = str(folder or Robot.path(name).parent)
         without_missing_meshes(spec, Path(spec.modelfiledir))
+        _ = list(hold_bases(spec))
         return Robot(Path(name).stem, spec.compile())
     except ValueError as error:
         raise RobotError(f"MuJoCo cannot compile {name!r} with these parameters: {' '.join(str(error).split())}") from error
@@ -163,6 +165,7 @@ def _document(name: str, mounting: Mounting) -> ElementTree.Element:
     if _made(path) or not mounting.plain:
         spec = Robot.spec(name)
         mounting.edit(spec)
+        _ = list(drop_ties(spec))
         spec.compile()
         return ElementTree.fromstring(spec.to_xml())
     root = _parsed(path)
@@ -193,7 +196,8 @@ def _elements(root: ElementTree.Element) -> tuple[list[ElementTree.Element], lis
     """Return the elements of bodies, with the world's at 0, and of joints, by their numbers in the model."""
     worlds = [world for world in root if world.tag == "worldbody"]
     bodies = [body for world in worlds for body in world.iter("body")]
-    return [worlds[0], *bodies], [joint for world in worlds for joint in world.iter("joint")]
+    joints = (joint for world in worlds for joint in world.iter("joint"))
+    return [worlds[0], *bodies], [joint for joint in joints if joint.get("type") != "free"]
 
 
 def _require_alike(robot: Robot, root: ElementTree.Element) -> None:

@@ -1,5 +1,6 @@
 """A robot: a compiled MuJoCo model of one arm and what the bench asks of it."""
 
+import re
 import shlex
 import warnings
 from collections.abc import Callable
@@ -19,6 +20,7 @@ from idbench.identify.plugins import did_you_mean
 from idbench.sim.errors import BenchError, RobotError
 from idbench.sim.robot.dh import TABLE, from_table
 from idbench.sim.robot.motors import Array, Motors
+from idbench.sim.robot.opened import drop_ties, hold_bases
 from idbench.sim.robot.payload import without_missing_meshes
 from idbench.sim.robot.urdf import SMALL, from_urdf
 
@@ -51,7 +53,7 @@ class Robot:
             hold = " ".join(shlex.quote(f"{joint.name}=0") for joint in other)
             raise RobotError(
                 f"robot {self.name!r}: a joint must turn about or slide along one axis, which {called} does not (its body "
-                f"floats or turns freely): --lock {hold} holds it where the file has it"
+                f"turns freely): --lock {hold} holds it where the file has it"
             )
         if not self.model.njnt:
             raise RobotError(f"robot {self.name!r} has no joints")
@@ -77,6 +79,7 @@ class Robot:
                 edit(spec)
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")  # what it warns of ends a simulation, by name
+                notes = (*notes, *hold_bases(spec), *drop_ties(spec))
                 robot = cls(Path(name).stem, spec.compile(), notes)
             robot.require_possible()
             robot.require_resisting()
@@ -233,8 +236,24 @@ def _read(path: Path) -> tuple[mujoco.MjSpec, list[str]]:
     text = path.read_text(encoding="utf-8")
     if "<robot" in text:
         return from_urdf(text)
+    if "<mujocoinclude" in text:
+        raise RobotError(_of_a_part(path))
     spec = mujoco.MjSpec.from_file(str(path))
     return spec, without_missing_meshes(spec, path.parent)
+
+
+def _of_a_part(path: Path) -> str:
+    """Return which file to give instead of one that others include."""
+    others = [other for other in sorted(path.parent.glob("*.xml")) if other != path and _includes(other, path.name)]
+    named = f": give {' or '.join(map(str, others))}" if others else ", which is the one to give"
+    return f"this file is a part that another includes{named}"
+
+
+def _includes(other: Path, name: str) -> bool:
+    try:
+        return bool(re.search(rf"""<include[^>]*["'](\./)?{re.escape(name)}["']""", other.read_text(encoding="utf-8")))
+    except (OSError, ValueError):
+        return False
 
 
 def _smaller_side(limits: Array) -> float:

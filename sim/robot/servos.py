@@ -52,7 +52,7 @@ class ServoValues:
     supply: float
     """Supply voltage [V]."""
     duty_limit: float
-    """Largest duty."""
+    """Largest duty, torque or current; infinite if there is none."""
     armature: float
     """Ia of the joint [kg m^2]."""
     damping: float
@@ -65,6 +65,12 @@ class ServoValues:
     """Of the command [s]."""
     backlash: float = 0.0
     """Free play between rotor and link [rad]."""
+    kd: float = 0.0
+    """Duty, torque or current per speed [rad/s], within the limit."""
+    time_constant: float = 0.0
+    """Of a low-pass of the command [s]."""
+    motor: bool = True
+    """Whether a duty drives a DC motor; a torque, or a current, is what `position` and `velocity` of MuJoCo command."""
 
 
 def links(name: str, mounting: Mounting = PLAIN, payload: Payload = Payload()) -> Robot:  # noqa: B008  # frozen
@@ -115,11 +121,13 @@ def with_servos(
             actuators.remove(old)
     option = root.find("option")
     option = ElementTree.SubElement(root, "option") if option is None else option
-    option.set("timestep", repr(STEP))
-    option.set("integrator", "implicitfast")  # RK4 holds the state of a dcmotor over its whole step
+    if any(servo.motor for servo in servos.values()):
+        option.set("timestep", repr(STEP))
+        option.set("integrator", "implicitfast")  # RK4 holds the state of a dcmotor over its whole step
+    step = float(option.get("timestep", robot.model.opt.timestep))
     block = ElementTree.SubElement(root, "actuator")
     for j, servo in servos.items():
-        tag, attributes = ("position", _position(servo)) if position else ("dcmotor", _dcmotor(servo))
+        tag, attributes = _plain(servo, step) if position or not servo.motor else ("dcmotor", _dcmotor(servo))
         ElementTree.SubElement(block, tag, {"name": f"{robot.joints[j]}_servo", "joint": robot.joints[j], **attributes})
     ElementTree.indent(root)
     text = ElementTree.tostring(root, encoding="unicode") + "\n"
@@ -153,21 +161,29 @@ def _dcmotor(servo: ServoValues) -> dict[str, str]:
     K = servo.b / servo.a
     rate = servo.rate if np.isfinite(servo.rate) else 0.0
     kp, most = servo.gain * servo.supply * servo.a, servo.duty_limit * servo.supply
+    kd = servo.b + servo.kd * servo.supply * servo.a
     samples = round(servo.delay / STEP + EARLY)
     late = {"nsample": str(samples), "delay": repr(samples * STEP)}
     return {
         "motorconst": repr(K),
         "resistance": repr(K / servo.a),
         "input": "pos",
-        "controller": " ".join(repr(float(x)) for x in (kp, 0.0, servo.b, rate, 0.0, most)),
+        "controller": " ".join(repr(float(x)) for x in (kp, 0.0, kd, rate, 0.0, most)),
         **late,
     }
 
 
-def _position(servo: ServoValues) -> dict[str, str]:
-    most = servo.a * servo.supply * servo.duty_limit
-    kp = servo.gain * servo.supply * servo.a
-    return {"kp": repr(kp), "kv": repr(servo.b), "forcerange": f"{-most!r} {most!r}"}
+def _plain(servo: ServoValues, step: float) -> tuple[str, dict[str, str]]:
+    """Return `position`, or `velocity` of a loop without kp; of a DC motor without rate limit and delay, for older versions."""
+    scale = servo.a * servo.supply
+    kp, most = scale * servo.gain, scale * servo.duty_limit
+    kv = scale * servo.kd + servo.b
+    found = {"kv": repr(float(kv))} | ({"forcerange": f"{-most!r} {most!r}"} if np.isfinite(most) else {})
+    if not servo.motor:
+        samples = max(0, round(servo.delay / step + 0.5))  # a force acts from half a step before
+        found |= {"nsample": str(samples), "delay": repr(samples * step)} if samples else {}
+        found |= {"timeconst": repr(servo.time_constant)} if servo.time_constant and kp else {}
+    return ("position", {"kp": repr(float(kp)), **found}) if kp else ("velocity", found)
 
 
 @final

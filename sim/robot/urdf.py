@@ -2,6 +2,8 @@
 
 from collections.abc import Iterator, Mapping
 from xml.etree import ElementTree
+from xml.parsers import expat
+from xml.sax.saxutils import quoteattr
 
 import mujoco
 import numpy as np
@@ -18,6 +20,9 @@ SIZE = 0.05
 TINY = 1e-12
 """Second moment [kg m^2] below which MuJoCo takes it for none."""
 
+ROTOR_INERTIA, GEAR_RATIO = "drake:rotor_inertia", "drake:gear_ratio"
+"""What Drake reads of a motor: inertia of its rotor [kg m^2], and turns of it for one of the joint."""
+
 ROUND, LEAST = 1e-9, 1e-3
 """Share of the largest second moment above which the least is one that a body has; and to which others are raised."""
 
@@ -30,20 +35,87 @@ def from_urdf(text: str) -> tuple[mujoco.MjSpec, list[str]]:
     RobotError
         If it is a xacro.
     """
-    root = ElementTree.fromstring(text)
+    root, lines = parsed(text)
     for link in root.iter("link"):
         for shape in [child for child in link if child.tag in ("visual", "collision")]:
             link.remove(shape)
+    rotors = dict(_rotors(root))
     for other in [child for child in root if child.tag in ("gazebo", "transmission", "ros2_control", "mujoco")]:
         root.remove(other)
     _require_plain(root)
     mended = list(_mend(root))
-    spec = mujoco.MjSpec.from_string(ElementTree.tostring(root, encoding="unicode"))
+    spec = mujoco.MjSpec.from_string(_written(root, lines))
     for joint in root.iter("joint"):
         limit = joint.find("limit")
         if limit is not None and float(limit.get("velocity", 0)) > 0:
             spec.add_numeric(name=f"max_velocity {joint.get('name')}", data=[float(limit.get("velocity", 0))], size=1)
+    for joint in spec.joints:
+        joint.armature = rotors.get(joint.name, joint.armature)
     return spec, mended
+
+
+def _rotors(root: ElementTree.Element) -> Iterator[tuple[str, float]]:
+    """Yield the joints whose motors have rotors, and their inertias as seen at the joint [kg m^2]."""
+    for transmission in root.findall("transmission"):
+        every = (x for actuator in transmission.findall("actuator") for x in actuator.iter())
+        stated = {x.tag: _stated(x, transmission) for x in every if x.tag in (ROTOR_INERTIA, GEAR_RATIO)}
+        if ROTOR_INERTIA in stated:
+            for joint in transmission.findall("joint"):
+                yield joint.get("name", ""), stated[ROTOR_INERTIA] * stated.get(GEAR_RATIO, 1.0) ** 2
+
+
+def _stated(element: ElementTree.Element, transmission: ElementTree.Element) -> float:
+    try:
+        return float(element.get("value", ""))
+    except ValueError as error:
+        name, value = transmission.get("name", ""), element.get("value")
+        raise RobotError(f"transmission {name!r}: {element.tag} has the value {value!r}, which is no number") from error
+
+
+Lines = dict[ElementTree.Element, int]
+"""Lines of a file at which its elements begin."""
+
+
+def parsed(text: str, *, comments: bool = False) -> tuple[ElementTree.Element, Lines]:
+    """Return the elements of a file, also those with prefixes that nothing declares, and their lines.
+
+    Raises
+    ------
+    RobotError
+        If it is no XML.
+    """
+    builder, parser = ElementTree.TreeBuilder(insert_comments=comments), expat.ParserCreate()
+    lines = Lines()
+
+    def start(tag: str, attributes: dict[str, str]) -> None:
+        lines[builder.start(tag, attributes)] = parser.CurrentLineNumber
+
+    parser.StartElementHandler, parser.EndElementHandler = start, builder.end
+    parser.CommentHandler = builder.comment
+    try:
+        parser.Parse(text.encode(), True)
+    except expat.ExpatError as error:
+        raise RobotError(f"it is no XML: {error}") from error
+    return builder.close(), lines
+
+
+def _written(root: ElementTree.Element, lines: Lines) -> str:
+    """Return elements as text, each at its line of the file, so that what MuJoCo says of a line holds there."""
+    written, names = list[str](), list[str]()
+    at, open_ = 1, [iter((root,))]
+    while open_:
+        element = next(open_[-1], None)
+        if element is None:
+            open_.pop()
+            written += [f"</{names.pop()}>"] if names else []
+            continue
+        down = max(0, lines.get(element, 0) - at)
+        attributes = "".join(f" {name}={quoteattr(value)}" for name, value in element.attrib.items())
+        written.append("\n" * down + f"<{element.tag}{attributes}>")
+        at += down
+        names.append(element.tag)
+        open_.append(iter(list(element)))
+    return "".join(written)
 
 
 def _require_plain(root: ElementTree.Element) -> None:

@@ -3,31 +3,37 @@
 from collections.abc import Mapping
 from xml.etree import ElementTree
 
-import numpy as np
-
 from idbench.identify.basis.block import named
-from idbench.identify.data.kinematics import INERTIAL, KinematicTree
-from idbench.sim.robot.motors import Array
+from idbench.identify.data.kinematics import KinematicTree
 from idbench.sim.robot.mounting import Mounting
+from idbench.sim.robot.placed import BASE, Body, PlacedLink, numbers, placed_links
 from idbench.sim.robot.robot import Robot
+from idbench.sim.robot.urdf import GEAR_RATIO, ROTOR_INERTIA, parsed
 
 UNLIMITED = 1e6
 """What stands for no limit, where a URDF must have one."""
+
+DRAKE = "http://drake.mit.edu"
+"""Namespace of the elements that Drake reads."""
 
 
 def urdf_text(name: str, robot: Robot, tree: KinematicTree, standard: Mapping[str, float], mounting: Mounting) -> str:
     """Return a robot as URDF with the standard parameters `standard`, by their names.
 
     A URDF stays as it is, but for inertias, damping and friction: the inertia of a link stands at the link that its joint
-    moves, what is welded to it has none. Other robots become links and joints without shapes. Rotors have no place in it.
+    moves, what is welded to it has none. Other robots become links and joints without shapes. Inertias of rotors stand in
+    transmissions, where Drake and idbench read them.
     """
     path = Robot.path(name)
     text = path.read_text(encoding="utf-8")
     if mounting.plain and "<robot" in text:
-        root = ElementTree.fromstring(text, ElementTree.XMLParser(target=ElementTree.TreeBuilder(insert_comments=True)))
+        root, _ = parsed(text, comments=True)
         _rewrite(root, tree, standard)
     else:
         root = _made(robot, tree, standard)
+    for j, of in enumerate(tree.joints):
+        if (rotor := standard.get(named("Ia", j))) is not None and (rotor or _has_rotor(root, of.name)):
+            _drive(root, of.name, rotor)
     ElementTree.indent(root)
     return '<?xml version="1.0"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
 
@@ -47,38 +53,58 @@ def _rewrite(root: ElementTree.Element, tree: KinematicTree, standard: Mapping[s
             _bare(links[other])
             waiting += welded.get(other, ())
         _bare(links[link])
-        _give(links[link], standard, j)
-        _resist(joints[of.name], standard, j)
+        _give(links[link], Body.of(standard, j))
+        _resist(joints[of.name], {x: standard[named(x, j)] for x in ("Fv", "Fs") if named(x, j) in standard})
 
 
 def _made(robot: Robot, tree: KinematicTree, standard: Mapping[str, float]) -> ElementTree.Element:
-    """Return the robot as links and joints without shapes; a link's frame is at its joint's axis, as URDF has it."""
+    """Return the robot as links and joints without shapes."""
     root = ElementTree.Element("robot", {"name": tree.name})
-    ElementTree.SubElement(root, "link", {"name": "base"})
-    anchors = [np.zeros(3) if joint.kind == "slide" else joint.anchor for joint in tree.joints]
-    for j, of in enumerate(tree.joints):
-        link = ElementTree.SubElement(root, "link", {"name": f"link_{of.name}"})
-        _give(link, standard, j, anchors[j])
-        slide = of.kind == "slide"
-        bounded = bool(np.isfinite(of.range).all())
-        kind = "prismatic" if slide else "revolute" if bounded else "continuous"
-        joint = ElementTree.SubElement(root, "joint", {"name": of.name, "type": kind})
-        parent = f"link_{tree.joints[of.parent].name}" if of.parent >= 0 else "base"
-        before = anchors[of.parent] if of.parent >= 0 else np.zeros(3)
-        # Positions count from 0 in a URDF: the frame is placed where the joint is 0.
-        turned = of.rotation @ (np.eye(3) if slide else _turn(of.axis, -of.zero))
-        place = of.position + of.rotation @ anchors[j] - before - (of.rotation @ of.axis * of.zero if slide else 0)
-        ElementTree.SubElement(joint, "origin", {"xyz": _numbers(place), "rpy": _numbers(_angles(turned))})
-        ElementTree.SubElement(joint, "parent", {"link": parent})
-        ElementTree.SubElement(joint, "child", {"link": f"link_{of.name}"})
-        ElementTree.SubElement(joint, "axis", {"xyz": _numbers(of.axis)})
+    ElementTree.SubElement(root, "link", {"name": BASE})
+    for link in placed_links(robot, tree, standard):
+        _give(ElementTree.SubElement(root, "link", {"name": link.name}), link.body)
+        kind = "prismatic" if link.slides else "revolute" if _bounded(link) else "continuous"
+        joint = ElementTree.SubElement(root, "joint", {"name": link.joint.name, "type": kind})
+        ElementTree.SubElement(joint, "origin", {"xyz": numbers(link.place), "rpy": numbers(link.angles)})
+        ElementTree.SubElement(joint, "parent", {"link": link.parent})
+        ElementTree.SubElement(joint, "child", {"link": link.name})
+        ElementTree.SubElement(joint, "axis", {"xyz": numbers(link.joint.axis)})
         if kind != "continuous":
-            low, high = of.range if bounded else (-UNLIMITED, UNLIMITED)
-            limits = {"lower": low, "upper": high, "effort": robot.torque_limits[j], "velocity": robot.most("velocity")[j]}
-            stated = {key: repr(float(x) if np.isfinite(x) else UNLIMITED) for key, x in limits.items()}
-            ElementTree.SubElement(joint, "limit", stated)
-        _resist(joint, standard, j)
+            free = {"lower": -UNLIMITED, "upper": UNLIMITED, "effort": UNLIMITED, "velocity": UNLIMITED}
+            stated = {**free, **{x: of for x, of in link.limits.items() if _bounded(link) or x in ("effort", "velocity")}}
+            ElementTree.SubElement(joint, "limit", {x: repr(float(of)) for x, of in stated.items()})
+        _resist(joint, link.drive)
     return root
+
+
+def _bounded(link: PlacedLink) -> bool:
+    return {"lower", "upper"} <= link.limits.keys()
+
+
+def _transmission(root: ElementTree.Element, joint: str) -> ElementTree.Element | None:
+    own = (x for x in root.findall("transmission") for of in x.findall("joint") if of.get("name") == joint)
+    return next(own, None)
+
+
+def _has_rotor(root: ElementTree.Element, joint: str) -> bool:
+    transmission = _transmission(root, joint)
+    return transmission is not None and any(x.tag == ROTOR_INERTIA for x in transmission.iter())
+
+
+def _drive(root: ElementTree.Element, joint: str, rotor: float) -> None:
+    """Give a joint a motor with a rotor, as seen at the joint; in the transmission that it has, if it has one."""
+    root.set("xmlns:drake", DRAKE)
+    transmission = _transmission(root, joint)
+    if transmission is None:
+        transmission = ElementTree.SubElement(root, "transmission", {"name": f"{joint}_transmission"})
+        ElementTree.SubElement(transmission, "type").text = "transmission_interface/SimpleTransmission"
+        ElementTree.SubElement(transmission, "joint", {"name": joint})
+    actuator = transmission.find("actuator")
+    if actuator is None:
+        actuator = ElementTree.SubElement(transmission, "actuator", {"name": f"{joint}_motor"})
+    for tag, value in ((ROTOR_INERTIA, rotor), (GEAR_RATIO, 1.0)):
+        found = next((x for x in actuator if x.tag == tag), None)  # to find() a prefix is one that is declared
+        (ElementTree.SubElement(actuator, tag) if found is None else found).set("value", repr(float(value)))
 
 
 def _end(joint: ElementTree.Element, tag: str) -> str:
@@ -91,45 +117,21 @@ def _bare(link: ElementTree.Element) -> None:
         link.remove(inertial)
 
 
-def _give(link: ElementTree.Element, standard: Mapping[str, float], j: int, origin: Array | None = None) -> None:
-    """Give a link its mass, centre of mass and inertia, about an origin of its own."""
-    if named("M", j) not in standard:
+def _give(link: ElementTree.Element, body: Body | None) -> None:
+    """Give a link its mass, centre of mass and inertia."""
+    if body is None:
         return
-    xx, xy, xz, yy, yz, zz, *first, mass = (standard[named(x, j)] for x in INERTIAL)
-    centre = np.array(first) / mass if mass > 0 else np.zeros(3)
-    about = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    inertia = about - mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
     inertial = ElementTree.SubElement(link, "inertial")
-    shown = centre if origin is None else centre - origin
-    ElementTree.SubElement(inertial, "origin", {"xyz": _numbers(shown), "rpy": "0 0 0"})
-    ElementTree.SubElement(inertial, "mass", {"value": repr(float(mass))})
+    ElementTree.SubElement(inertial, "origin", {"xyz": numbers(body.centre), "rpy": "0 0 0"})
+    ElementTree.SubElement(inertial, "mass", {"value": repr(body.mass)})
     names = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
-    values = zip(names, inertia[np.triu_indices(3)], strict=True)
-    ElementTree.SubElement(inertial, "inertia", {name: repr(float(value)) for name, value in values})
+    ElementTree.SubElement(inertial, "inertia", {name: repr(x) for name, x in zip(names, body.six, strict=True)})
 
 
-def _resist(joint: ElementTree.Element, standard: Mapping[str, float], j: int) -> None:
+def _resist(joint: ElementTree.Element, drive: Mapping[str, float]) -> None:
     """Give a joint its viscous and Coulomb friction."""
     dynamics = joint.find("dynamics")
     dynamics = ElementTree.SubElement(joint, "dynamics") if dynamics is None else dynamics
     for letters, attribute in (("Fv", "damping"), ("Fs", "friction")):
-        if named(letters, j) in standard:
-            dynamics.set(attribute, repr(float(standard[named(letters, j)])))
-
-
-def _turn(axis: Array, angle: float) -> Array:
-    x, y, z = axis
-    K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return np.asarray(np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * (K @ K))
-
-
-def _angles(R: Array) -> Array:
-    """Return roll, pitch and yaw of a rotation, Rz(yaw) Ry(pitch) Rx(roll)."""
-    pitch = np.arctan2(-R[2, 0], np.hypot(R[0, 0], R[1, 0]))
-    if np.hypot(R[0, 0], R[1, 0]) < 1e-9:  # roll and yaw turn about one axis
-        return np.array([np.arctan2(-R[1, 2], R[1, 1]), pitch, 0.0])
-    return np.array([np.arctan2(R[2, 1], R[2, 2]), pitch, np.arctan2(R[1, 0], R[0, 0])])
-
-
-def _numbers(values: Array) -> str:
-    return " ".join(repr(float(value)) for value in values)
+        if letters in drive:
+            dynamics.set(attribute, repr(float(drive[letters])))

@@ -3,6 +3,7 @@
 from typing import Annotated, final
 
 import numpy as np
+import numpy.typing as npt
 from pydantic import Field
 
 from idbench.sim.errors import ScenarioError
@@ -47,6 +48,15 @@ DRAWS = 10000
 """Draws of all joints, and then of single ones, after which no waypoint is believed to exist."""
 
 
+BLOCK = 50
+"""Draws that are looked at together."""
+
+
+def _far(points: Array, neighbours: Array, smallest_move: Array | float) -> npt.NDArray[np.bool_]:
+    """Return which joints of points, shape (draw, joint), are far enough from all neighbours, of the same shape."""
+    return np.asarray((np.abs(neighbours - points[:, None]) >= smallest_move).all(axis=1))
+
+
 def draw_waypoint(
     rng: np.random.Generator, ranges: Array, neighbours: Array, clearance: Array | float, smallest_move: Array | float
 ) -> Array:
@@ -69,13 +79,20 @@ def draw_waypoint(
     """
     low, high = ranges[:, 0] + clearance, ranges[:, 1] - clearance
     if (low < high).all() and np.isfinite(ranges).all():
-        point, far = np.zeros(len(ranges)), np.zeros(len(ranges), dtype=np.bool_)
-        for k in range(2 * DRAWS):
-            # All joints of a hand are seldom right in one draw: then those that are wrong are drawn again.
-            point = np.where(far & (k > DRAWS), point, rng.uniform(low, high))
-            far = np.asarray((np.abs(neighbours - point) >= smallest_move).all(axis=0))
+        for _ in range(DRAWS // BLOCK):
+            before = rng.bit_generator.state
+            points = rng.uniform(low, high, (BLOCK, len(ranges)))
+            right = _far(points, neighbours, smallest_move).all(axis=-1)
+            if right.any():
+                rng.bit_generator.state = before  # which has drawn no more than it took
+                return np.asarray(rng.uniform(low, high, (int(right.argmax()) + 1, len(ranges)))[-1])
+        # All joints of a hand are seldom right in one draw: those that are wrong are drawn again.
+        point = rng.uniform(low, high)
+        for _ in range(DRAWS):
+            far = _far(point[None], neighbours, smallest_move)[0]
             if far.all():
                 return point
+            point = np.where(far, point, rng.uniform(low, high))
     narrow = int(np.argmin(high - low))
     raise ScenarioError(
         f"no waypoint is {np.max(smallest_move):g} rad from its neighbours and {np.max(clearance):g} rad inside the ranges of "

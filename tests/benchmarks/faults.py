@@ -2,8 +2,9 @@
 
     uv run python tests/benchmarks/faults.py [ROBOT ...] [--noise 0.5 4] [--seeds 3] [--only NAME ...] [--nulls]
 
-prints, for each fault, noise and seed, whether the first cause that is named is right, seconds of the diagnosis,
-and what is named; with --nulls logs without a fault, which are right where nothing is named.
+prints, for each fault, noise and seed, whether the first cause that is named is right, how much less likely the log is
+than the same without the fault (twice the logarithm of the ratio: below 40 it cannot show the fault), seconds of the
+diagnosis, and what is named; with --nulls logs without a fault, which are right where nothing is named.
 """
 
 import argparse
@@ -17,6 +18,7 @@ sys.path.insert(0, str(Path(__file__).parent.parent / "identify"))
 from fault_logs import FAULTS, NULLS, Case
 
 from idbench.identify.judge.suspect import Suspect
+from idbench.identify.judge.whole_mistakes import DECISIVE
 
 
 def _named(cause: str, j: int | None) -> str:
@@ -29,16 +31,18 @@ def _said(s: Suspect) -> str:
     return f"{_named(s.cause, s.joint)} {size} (t {s.t:.1f}, {gain}{f', or {others}' if others else ''})"
 
 
-def run(case: Case) -> bool:
-    """Print what is named; return whether it is right."""
+def run(case: Case) -> tuple[bool, bool]:
+    """Print what is named; return whether it is right, and whether the log can show it."""
     begin = time.perf_counter()
     found = case.found()
     right = found[0].cause in case.causes if found else not case.causes
     took, words = time.perf_counter() - begin, "; ".join(map(_said, found))
-    print(
-        f"{case.robot:9} {case.noise:4} {case.name:20} {case.seed} {'ok' if right else '--'} {took:.1f} s {words}", flush=True
+    shown = case.shown() if case.causes else 0.0
+    line = (
+        f"{case.robot:9} {case.noise:4} {case.name:20} {case.seed} {'ok' if right else '--'} {shown:8.0f} {took:.1f} s {words}"
     )
-    return right
+    print(line, flush=True)
+    return right, right or shown > DECISIVE
 
 
 def main(argv: list[str] | None = None) -> None:
@@ -55,8 +59,8 @@ def main(argv: list[str] | None = None) -> None:
         cases = [Case(r, x, name, seed, FAULTS["none"][0], (), NULLS[name]) for r, x, seed in of_all for name in NULLS]
     else:
         cases = [Case(r, x, name, seed, *FAULTS[name]) for r, x, seed in of_all for name in asked.only]
-    right = [run(case) for case in cases]
-    print(f"right: {sum(right)} of {len(right)}")
+    right, shown = zip(*map(run, cases), strict=True)
+    print(f"right: {sum(right)} of {len(right)}, of {sum(shown)} that their logs can show")
 
 
 if __name__ == "__main__":

@@ -13,6 +13,7 @@ What remains of the best law is then split: without spikes; without ages of the 
 """
 
 import sys
+from dataclasses import replace
 from itertools import product
 from multiprocessing import Pool
 from pathlib import Path
@@ -21,9 +22,9 @@ from time import perf_counter
 import numpy as np
 from scipy.stats import wilcoxon
 
-from idbench.identify.servo import JointLoad, Servo, ServoRun, UnscaledError, identify_servo
+from idbench.identify.servo import JointLoad, Servo, ServoRun, identify_servo
 
-SERVO = Servo(0.166, supply=12.0, duty_limit=0.97)
+SERVO = Servo(0.166, supply=12.0, limit=0.97, counts=4096)
 LAWS = ("load", "coulomb", "stribeck", "load-stribeck", "directional", "quadratic", "gear", "gear+lead", "gear+backlash")
 AGES = 4
 """Samples after which the age of the reported position repeats."""
@@ -35,7 +36,8 @@ def read(path):
     place = {str(name): i for i, name in enumerate(file["columns"])}
     t, q, goal, on = (file["data"][:, :, place[name]].astype(float) for name in ("t", "q", "goal", "torque_enable"))
     loads = [JointLoad.pendulum(m, x) for m, x in zip(file["mass"], file["length"], strict=True)]
-    runs = [ServoRun(*each, on > 0.5) for *each, on in zip(t, q, goal, loads, file["kp"].astype(float), on, strict=True)]
+    servos = [replace(SERVO, kp=float(kp)) for kp in file["kp"]]
+    runs = [ServoRun(*each, on > 0.5) for *each, on in zip(t, q, goal, loads, servos, on, strict=True)]
     return runs, {name: file[name] for name in ("mass", "length", "kp", "trajectory")}
 
 
@@ -48,11 +50,9 @@ def fold(task):
         out = about[key] == value
         start = perf_counter()
         name, *more = law.split("+")
-        try:
-            fit = identify_servo(SERVO, [run for run, o in zip(runs, out, strict=True) if not o], name, more)
-        except UnscaledError as error:  # its torques are refused, its positions can be judged
-            fit = error.fit
-            print(f"{law} without {key} {value:g}: {error}", flush=True)
+        fit = identify_servo([run for run, o in zip(runs, out, strict=True) if not o], name, more)
+        if not fit.scaled:
+            print(f"{law} without {key} {value:g}: torques are known up to a factor", flush=True)
         seconds = perf_counter() - start
         np.savez(kept, q=fit.simulate([run for run, o in zip(runs, out, strict=True) if o]), seconds=seconds)
     with np.load(kept) as file:
@@ -87,9 +87,9 @@ def split(path, r):
         aged[i, own] -= speed[i, own] * (smooth[own] @ speed[i, own]) / (speed[i, own] @ speed[i, own] + 1e-9)
     print(f"without ages of the reported position: {np.abs(aged)[well].mean():.4f} rad")
     error, kp = (
-        np.concatenate([x, x]) for x in (np.stack([run.command - run.clean for run in runs]), [run.kp for run in runs])
+        np.concatenate([x, x]) for x in (np.stack([run.command - run.clean for run in runs]), [run.servo.kp for run in runs])
     )
-    full, rest = (SERVO.gain * kp[:, None] * np.abs(error) > SERVO.duty_limit) & on, np.abs(speed) < 0.05
+    full, rest = (SERVO.gain * kp[:, None] * np.abs(error) > SERVO.limit) & on, np.abs(speed) < 0.05
     kinds = {"off, at rest": ~on & rest, "off, falling": ~on & ~rest, "duty at its limit": full, "at rest": on & rest & ~full}
     kinds["moving"] = on & ~rest & ~full
     for name, when in kinds.items():

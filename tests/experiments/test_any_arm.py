@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from idbench.experiments.identification.consistent_robot import WrittenRobot
-from idbench.experiments.identification.fit import fit
+from idbench.experiments.identification.fitting import fit
 from idbench.experiments.identification.logs import Logs
 from idbench.experiments.identification.request import Request
 from idbench.experiments.identification.robot_model import RobotModel

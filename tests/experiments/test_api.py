@@ -256,6 +256,7 @@ def test_wrong_values_are_refused_by_name(files, call, words):
     assert words in str(refused.value)
 
 
+@pytest.mark.thorough
 def test_a_study_in_a_folder_goes_on_there(tmp_path):
     keys = {"seeds": 2, "chains": ["idbench"], "models": ["explicit"], "estimators": ["OLS"], "out": tmp_path / "kept"}
     one, two = idbench.study("encoder", **keys), idbench.study("encoder", **keys)

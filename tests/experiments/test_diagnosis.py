@@ -33,8 +33,12 @@ def test_a_wrong_torque_constant_is_named_and_the_option_mends_it(idbench, tmp_p
     assert (first["cause"], first["joint"], first["unit"]) == ("gain", "joint3", "1")
     assert abs(first["size"] - 0.1) < 4 * first["sigma"] + 0.01
     assert first["held_out"][1] < first["held_out"][0]
+    report = (tmp_path / "bad/report.html").read_text()
+    figure = report.partition("What the mistakes explain")[2].partition("</svg>\n</svg>")[0].partition("<h2>")[0]
+    assert "torque constant" in figure
+    assert "joint3" in figure
     assert first["remedy"] in err.replace("\n", " ") + out.replace("\n", " ")
-    code, out, _ = idbench("identify", "bad.csv", *how, *first["remedy"].partition(" (")[0].split(), "--out", "good")
+    code, out, _ = idbench("identify", "bad.csv", *how, *first["remedy"].split(), "--out", "good")
     assert "Result: good" in out
     assert json.loads((tmp_path / "good/summary.json").read_text())["diagnosis"] == []
 
@@ -45,6 +49,7 @@ def test_every_mistake_has_words():
         ("sign", "torque"),
         ("sign", "position"),
         ("exchanged", "torque"),
+        ("exchanged", "position"),
         ("gravity", "base"),
         ("missing_torque", "torque"),
     }

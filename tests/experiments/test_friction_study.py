@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from idbench.experiments.identification.fit import fit
+from idbench.experiments.identification.fitting import fit
 from idbench.experiments.identification.friction_choice import chosen_friction
 from idbench.experiments.identification.logs import Logs
 from idbench.experiments.identification.request import Request

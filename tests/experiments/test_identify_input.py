@@ -32,6 +32,7 @@ def test_times_in_milliseconds(idbench, as_csv):
     assert "has a sample every 4 s, if t is in s: is it in ms, us or ns?" in err
 
 
+@pytest.mark.thorough
 def test_wrapped_angles_are_refused_and_unwrapped_when_asked(idbench, as_csv):
     def wrapped(q):
         shifted = q + [0, 0, 0, np.pi, 0, 0]  # counted from another zero, joint 4 crosses the end of a turn
@@ -168,6 +169,7 @@ def test_a_joint_that_never_moves_does_not_keep_the_others_from_being_recorded(t
 DEGREES = '[q]\ncolumns = "q*"\nunit = "deg"\n[tau]\ncolumns = "tau*"\n[torque]\nmeaning = "held"\n'
 
 
+@pytest.mark.thorough
 def test_a_held_out_log_elsewhere_is_read_as_the_fitted_one_is(idbench, logs, tmp_path):
     """In degrees, which nothing beside it says; Parquet of idbench says itself that it is in rad."""
     for name, folder in (("first", "fitted"), ("second", "elsewhere")):

@@ -8,7 +8,11 @@ import numpy as np
 import pytest
 
 from idbench.experiments.cli import main
+from idbench.experiments.errors import ExperimentError
+from idbench.experiments.loads.job import payload_of
 from idbench.experiments.loads.simulated import Pairs
+from idbench.experiments.requests.jobs import KnownOptions, PayloadRequest
+from idbench.experiments.requests.shared import ColumnOptions
 from idbench.identify import ESTIMATORS, LogError, MotionLog, SettingError
 from idbench.identify.files.log_file import write_log
 from idbench.identify.loads.drive_gains import identify_drive_gains
@@ -165,6 +169,7 @@ def test_the_payload_command(files, capsys):
     assert len(summary["ways"]["together"]["covariance"]) == 10
 
 
+@pytest.mark.thorough
 def test_the_payload_of_a_robot_identified_before(files):
     identify = ["identify", "empty.parquet", "--robot", "puma560", "--model", "explicit", "--estimator", "WLS"]
     assert main([*identify, "--write", "arm.json"]) == 0
@@ -180,6 +185,50 @@ def test_the_gains_command(files, capsys):
     assert "to read logs with them: --gain " in capsys.readouterr().out
     summary = json.loads((files / "found" / "summary.json").read_text())
     np.testing.assert_allclose(summary["gains"], 1.0, rtol=0.02)
+
+
+def asked_of(files, **more):
+    return PayloadRequest(
+        log=(files / "full.parquet",), unloaded=(files / "empty.parquet",), robot="puma560", estimator="WLS", **more
+    )
+
+
+@pytest.mark.thorough
+def test_what_is_open_of_the_gains_is_open_of_the_payload(files):
+    """All gains scale all parameters: the slopes by each add up to the payload, so that sigmas s of n gains make s ML / sqrt(n)
+    of its mass at least, and s ML at most times the root of the sum of squared weights."""
+    s, plain = 0.03, payload_of(asked_of(files)).leading
+    found = payload_of(asked_of(files, gain_sigma=(s,))).leading
+    np.testing.assert_allclose(found.X, plain.X)
+    mass = found.names.index("ML")
+    own, more = plain.covariance[mass, mass], found.covariance[mass, mass]
+    assert more - own > (s * found.X[mass]) ** 2 / 6
+    one = payload_of(asked_of(files, gain_sigma=(0.0, s, 0.0, 0.0, 0.0, 0.0))).leading
+    assert own <= one.covariance[mass, mass] < more
+    with pytest.raises(ExperimentError, match="--gain-sigma 2: give a share"):
+        payload_of(asked_of(files, gain_sigma=(2.0,)))
+
+
+@pytest.mark.thorough
+def test_a_wrong_gain_of_both_logs_is_no_good_payload_and_is_named(files):
+    """Torques of joint 3 a tenth too large: other verdicts are those of one robot with one payload, which stays fair."""
+    right = payload_of(asked_of(files))
+    assert right.judgement.word(right.judgement.warnings(right.leading)) == "good"
+    made = payload_of(asked_of(files, reading=ColumnOptions(gain=(1.0, 1.0, 1.1, 1.0, 1.0, 1.0))))
+    judgement = made.judgement
+    assert (judgement.causes[0].suspect.cause, judgement.causes[0].joint) == ("gain", judgement.robot.tree.joints[2].name)
+    assert judgement.causes[0].suspect.size[0] == pytest.approx(0.1, abs=0.01)
+    assert judgement.word(judgement.warnings(made.leading)) != "good"
+
+
+@pytest.mark.thorough
+def test_the_command_that_shows_the_gains_is_said_in_full(files):
+    note = payload_of(asked_of(files)).notes[-1]
+    command = note.partition("a payload of known mass shows them: ")[2]
+    assert command.startswith("uv run idbench gains ")
+    assert command.endswith("--robot puma560 --mass KG --at X Y Z")
+    known = payload_of(asked_of(files, known=KnownOptions(mass=3.0)))
+    assert any("--mass 3 --at X Y Z" in warning for warning in known.judgement.warnings(known.leading)["the payload"])
 
 
 @pytest.mark.parametrize(

@@ -67,7 +67,7 @@ def test_the_papers_errors_count_to_the_digits_that_it_prints():
 
 @pytest.mark.thorough
 def test_the_command_writes_table_and_picture(tmp_path, capsys):
-    assert main(["table1", "--motions", "150", "--seed", "3", "--out", str(tmp_path / "out")]) == 0
+    assert main(["table1", "--motions", "90", "--seed", "3", "--out", str(tmp_path / "out")]) == 0
     printed = capsys.readouterr().out
     assert "of the paper's errors lie inside the band" in printed
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())

@@ -61,6 +61,7 @@ def test_a_model_and_a_chain_of_ones_own_are_named_on_the_command_line(own, idbe
     assert shown["chain"] == "slow"
 
 
+@pytest.mark.thorough
 def test_estimators_and_laws_of_ones_own_are_named_in_every_command(own, idbench, logs, tmp_path):
     words = ["--friction", "standard+own_parts:Drag", "--estimator", "own_parts:Ridge"]
     known = ["--robot", "puma560", "--torque", "held", "--model", "explicit", "--no-rerun", "--out", "found"]

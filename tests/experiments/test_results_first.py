@@ -67,6 +67,7 @@ def test_a_view_that_fails_leaves_everything_else(view, error, idbench, logs, tm
         assert "it cannot be drawn" in err
 
 
+@pytest.mark.thorough
 def test_smooth_functions_which_no_table_shows_break_no_view(idbench, logs, tmp_path):
     words = *WORDS, "--friction", "smooth", "--no-trials"
     code, _, err = idbench("identify", logs / "first.parquet", *words, "--out", "found")

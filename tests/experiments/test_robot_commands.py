@@ -149,7 +149,7 @@ def test_an_offset_is_no_error_of_the_simulated_robot(idbench, changed):
     code, out, err = idbench(*words, "--add", "offset", "--out", "found", "--no-rerun", "--write-mjcf", "out.xml")
     assert code == 0, err
     assert "explicit: good" in out
-    assert "off1, off2, off3, off4, off5, off6 have no place in an MJCF file and are left out" in out
+    assert "off1, off2, off3, off4, off5, off6 have no place in the file and are left out" in out
     summary = json.loads((path.parent / "found" / "summary.json").read_text())
     assert max(summary["validation"]["models"]["explicit"]["position_error_rms"]) < 1e-3
 

@@ -11,7 +11,7 @@ from idbench.experiments.servo.joints import Joints, JointsLog
 from idbench.experiments.study.servo_rows import _joints
 from idbench.identify import IdentificationError
 from idbench.identify.files.servo_log import ServoColumns
-from idbench.identify.servo import Servo, UnscaledError, identify_again, identify_servo
+from idbench.identify.servo import Servo, identify_again, identify_servo
 from idbench.identify.servo.identification import APART, per_offset
 from idbench.identify.servo.stages import looked_at
 from idbench.sim.engine.simulation import simulate
@@ -19,7 +19,7 @@ from idbench.sim.robot.mounting import PLAIN
 from idbench.sim.robot.servos import links
 from idbench.sim.scenario.scenario_file import load
 
-SERVO = Servo(0.166, 16.0, 12.0)
+SERVO = Servo(0.166, 16.0, 12.0, 0.97, 4096)
 
 
 @pytest.fixture
@@ -28,23 +28,31 @@ def arm():
     t = np.arange(0, 2, 0.01)
     q = 0.3 * np.sin(np.outer(t, 1 + np.arange(robot.n)))
     columns = ServoColumns(t, q, q, None, None, robot.joints)
-    return Joints(robot, (SERVO,) * robot.n, (JointsLog("one.csv", columns, (16.0,) * robot.n, robot),))
+    return Joints(robot, (JointsLog("one.csv", columns, (SERVO,) * robot.n, robot),))
+
+
+class Fake(SimpleNamespace):
+    """Stands for a fit, which is known by its identity."""
+
+    __hash__ = object.__hash__
 
 
 def fit_of(joint):
     """Return what stands for a fit: it simulates the joint as it was measured, with a jolt that was not seen."""
     jolt = np.where(np.arange(200) == 100, 1e-3, 0.0)
-    return SimpleNamespace(name=joint, p={"offset": 0.0}, parts=1, contrast=1.0, simulate=lambda runs: [runs[0].q + jolt])
+    return Fake(
+        name=joint, p={"offset": 0.0, "Ia": 0.01}, taken_late=0.0,
+        scaled=False, explained=True, errors=lambda runs: np.zeros(1), of_all=None,
+        fine=lambda run: (run.t, run.q + jolt), covariance=np.eye(1), free=("offset",), servo=SERVO,
+    )  # fmt: skip
 
 
 def test_a_joint_without_a_scale_moves_for_the_others_and_one_that_is_not_explained_does_not(arm, monkeypatch):
     seen, before = dict[str, float](), dict[str, float]()
 
-    def identify(j, servo, runs):
+    def identify(j, runs):
         before[j] = runs[0].load.rest
         assert runs[0].name == f"one.csv, {arm.links.joints[j]}"
-        if j == 4:
-            raise UnscaledError("scale together", fit_of(j))
         if j == 5:
             raise IdentificationError("does not move")
         return fit_of(j)
@@ -55,8 +63,7 @@ def test_a_joint_without_a_scale_moves_for_the_others_and_one_that_is_not_explai
 
     monkeypatch.setattr(module, "identify_again", again)
     found = list(arm.identified(identify))
-    assert [j for j, _ in found] == [0, 1, 2, 3, 4, 5, 0, 1, 2, 3, 4, 0, 1, 2, 3, 4]
-    assert found[4][1] == "scale together"
+    assert [j for j, _ in found] == [0, 1, 2, 3, 4, 5, *(3 * [0, 1, 2, 3, 4])]
     assert found[5][1] == "does not move"
     assert sorted(seen) == [0, 1, 2, 3, 4]
     # The gripper, which nothing explains, moves as measured; only the jolt of the wrist roll reaches it.
@@ -64,7 +71,7 @@ def test_a_joint_without_a_scale_moves_for_the_others_and_one_that_is_not_explai
     monkeypatch.setattr(module, "identify_again", lambda fit, runs: seen.update({fit.name: runs[0].load.rest}) or fit)
     alone = dict(seen)
 
-    def without_roll(j, servo, runs):
+    def without_roll(j, runs):
         if j >= 4:
             raise IdentificationError("does not move")
         return fit_of(j)
@@ -74,7 +81,7 @@ def test_a_joint_without_a_scale_moves_for_the_others_and_one_that_is_not_explai
 
 
 def test_a_joint_that_moves_alone_is_identified_once(arm):
-    def identify(j, servo, runs):
+    def identify(j, runs):
         if j:
             raise IdentificationError("does not move")
         return fit_of(j)
@@ -94,8 +101,8 @@ def test_a_joint_that_slides_is_refused(tmp_path):
     robot = links(str(tmp_path / "cart.xml"), PLAIN)
     t = np.arange(0, 2, 0.01)
     q = np.zeros((len(t), robot.n)) + 0.1 * np.sin(t)[:, None]
-    log = JointsLog("one.csv", ServoColumns(t, q, q, None, None, robot.joints), (16.0,) * robot.n, robot)
-    found = dict(Joints(robot, (SERVO,) * robot.n, (log,)).identified(lambda j, servo, runs: fit_of(j)))
+    log = JointsLog("one.csv", ServoColumns(t, q, q, None, None, robot.joints), (SERVO,) * robot.n, robot)
+    found = dict(Joints(robot, (log,)).identified(lambda j, runs: fit_of(j)))
     assert "rail slides" in found[0]
     assert not isinstance(found[1], str)
 
@@ -107,7 +114,7 @@ def test_offsets_are_what_gravity_says_of_all_joints_and_their_changes_what_anot
     scenario = replace(scenario, trajectory=replace(scenario.trajectory, steps=36), seed=4)
     joints = _joints(scenario, simulate(scenario).alone())
     found = {
-        j: fit for j, fit in joints.identified(lambda j, *known: identify_servo(*known, "coulomb")) if not isinstance(fit, str)
+        j: fit for j, fit in joints.identified(lambda j, runs: identify_servo(runs, "coulomb")) if not isinstance(fit, str)
     }
     assert {1, 2} <= set(found)
     for j in (1, 2):
@@ -122,8 +129,9 @@ def test_offsets_are_what_gravity_says_of_all_joints_and_their_changes_what_anot
         again = identify_again(elbow, runs[2])
         if not apart:
             one = again
+    now = joints.runs_with({**alone, 1: replace(shoulder, found=replace(shoulder.found, p={**shoulder.p, "offset": 0.0}))})
     shifted = joints.runs_with(
         {**alone, 1: replace(shoulder, found=replace(shoulder.found, p={**shoulder.p, "offset": APART}))}
     )
-    slope = per_offset(one, looked_at(one.servo, shifted[2], elbow.p["delay"]))[place]
+    slope = per_offset(one, *(looked_at(x, elbow.p["delay"]) for x in (now[2], shifted[2])))[place]
     assert again.p["offset"] - one.p["offset"] == pytest.approx(0.03 * slope, rel=0.2)

@@ -1,6 +1,7 @@
 """What was wrong without a word: it is refused, or told with what to do."""
 
 import json
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -94,6 +95,11 @@ def payload(tmp_path_factory):
 WAY = "--robot", "puma560", "--estimator", "WLS"
 
 
+def unhurried(err):
+    """Return what was complained of, without the progress that a busy machine shows."""
+    return "".join(line for line in err.splitlines(keepends=True) if not re.fullmatch(r"judging: .*, \d+ s\n?", line))
+
+
 @pytest.mark.thorough
 @pytest.mark.parametrize(
     ("loaded", "unloaded", "more", "words"),
@@ -111,7 +117,7 @@ WAY = "--robot", "puma560", "--estimator", "WLS"
 def test_a_payload_has_a_verdict(payload, idbench, loaded, unloaded, more, words):
     logs = payload / f"{loaded}.parquet", "--unloaded", payload / f"{unloaded}.parquet"
     code, out, err = idbench("payload", *logs, *WAY, *more)
-    assert (code, err) == (0, "")
+    assert (code, unhurried(err)) == (0, "")
     for word in words:
         assert word in out, word
     assert ("warning" in out) == (words[0] not in ("empty.parquet: good", "full.parquet: good"))
@@ -127,7 +133,7 @@ def test_logs_of_one_name_are_judged_each(payload, idbench, tmp_path):
     for loaded, unloaded, word in (("full", "empty", "good"), ("empty", "full", "poor")):
         logs = f"{loaded}/log.parquet", "--unloaded", f"{unloaded}/log.parquet"
         code, out, err = idbench("payload", *logs, *WAY, "--out", loaded + "-found")
-        assert (code, err) == (0, "")
+        assert (code, unhurried(err)) == (0, "")
         assert f"verdict: {word}" in out
         judged = json.loads((tmp_path / f"{loaded}-found" / "summary.json").read_text())["judgement"]
         assert (judged["verdict"], set(judged["logs"])) == (word, {"full/log.parquet", "empty/log.parquet"})

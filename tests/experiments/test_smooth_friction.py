@@ -56,7 +56,7 @@ def test_they_are_predicted_and_written(fits, tmp_path):
     np.testing.assert_allclose(arm["inverse_dynamics"](q, qd, qdd), fit.predict(q, qd, qdd), rtol=1e-6, atol=1e-6)
     assert "ZZR1" in repr(fit)
     assert "u1_1" not in repr(fit)
-    with pytest.warns(UserWarning, match="smooth functions of friction have no place in an MJCF file"):
+    with pytest.warns(UserWarning, match="smooth functions of friction have no place in the file"):
         fit.write(tmp_path / "arm.xml")
 
 

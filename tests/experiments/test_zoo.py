@@ -13,7 +13,7 @@ import pytest
 import scipy
 
 from idbench.experiments.cli import main
-from idbench.experiments.identification.fit import fit
+from idbench.experiments.identification.fitting import fit
 from idbench.experiments.identification.logs import Logs
 from idbench.experiments.identification.request import Request
 from idbench.experiments.identification.robot_model import RobotModel
@@ -273,7 +273,7 @@ def test_every_way_ends_with_a_result(real, way, tmp_path, monkeypatch, capsys):
 COMMANDS = {
     "robot": [],
     "run": ["arm.toml", "--no-rerun", "--robot"],
-    "excite": ["--no-rerun", "--duration", "4", "--velocity", "2", "--acceleration", "10", "--seed", "0"],
+    "excite": ["--no-rerun", "--duration", "2", "--velocity", "2", "--acceleration", "10", "--seed", "0"],
 }
 
 

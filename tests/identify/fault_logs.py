@@ -18,10 +18,11 @@ from idbench.identify import (
     estimate,
     idbench_chain,
 )
+from idbench.identify.arrays import TINY
 from idbench.identify.basis import tree_basis
 from idbench.identify.basis.basis import Basis
 from idbench.identify.data.kinematics import KinematicTree
-from idbench.identify.judge.diagnosis import diagnosed
+from idbench.identify.judge.diagnosis import diagnosed, silent_joint
 from idbench.identify.judge.suspect import Suspect
 from idbench.identify.signals.signals import State
 from idbench.sim.robot.robot import Robot
@@ -425,7 +426,16 @@ class Case:
     def found(self) -> tuple[Suspect, ...]:
         """Return what is wrong."""
         problem = self.problem()
-        return diagnosed(problem, estimate(problem, ESTIMATORS.create("GLS")).X)
+        X = estimate(problem, ESTIMATORS.create("GLS")).X
+        silent = silent_joint(problem, X)
+        return (silent,) if silent else diagnosed(problem, X)
+
+    def shown(self) -> float:
+        """Return how much less of the torques is explained than without the fault: sum of n log(share / share), n rows."""
+        clean = replace(self, fault=FAULTS["none"][0]).problem().factors
+        faulty = self.problem().factors
+        each = [np.log(f.squares(f.fit(2).X) / np.maximum(np.sum(f.R[..., -1] ** 2, axis=-1), TINY)) for f in (faulty, clean)]
+        return float(np.sum(clean.rows * (each[0] - each[1])))
 
     def motion(self) -> tuple[Basis, Array, State, Array]:
         """Return the robot, an estimate, some instants of the motion, and their times."""

@@ -136,6 +136,7 @@ def test_the_noise_of_an_encoder_is_found(bits, log):
     np.testing.assert_allclose(found, step / np.sqrt(12), rtol=0.2)
 
 
+@pytest.mark.thorough
 def test_torque_noise_is_found_beside_stronger_noise_of_the_positions(log):
     """Rows of up to 10 Hz, in which positions make most of the noise, not of what a motion tells: the rest of a difference of
     two large numbers would be anything. 60 draws; between half and twice, as rows of changing weight are taken for even ones.

@@ -1,12 +1,16 @@
 """Operations of the models' columns, counted against closed forms."""
 
+import numpy as np
 import pytest
 
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.requests.shared import Parameters
 from idbench.identify import BLOCKS, scara
 from idbench.identify.basis.joint_law import AbstractFriction
-from idbench.identify.basis.operations import _Tape, operations
+from idbench.identify.basis.operations import operations
+from idbench.identify.basis.symbols import SymbolArray, flat
+from idbench.identify.basis.tape import Tape
+from idbench.identify.errors import SettingError
 
 
 def test_one_joint_with_friction_costs_nothing_but_its_power():
@@ -47,6 +51,21 @@ def test_every_law_can_be_counted(law):
 
 def test_equal_constants_and_symbols_are_not_the_same_value():
     """The third value of a tape times two, and the second times three, are two products."""
-    tape = _Tape()
-    values = [tape.value("input", f"x{k}") for k in range(4)]
-    assert len({(values[3] * 2.0).number, (values[2] * 3.0).number, (values[2] * values[3]).number}) == 3
+    tape = Tape()
+    values = [tape.input("x", k) for k in range(4)]
+    pairs = (values[3], 2.0), (values[2], 3.0), (values[2], values[3])
+    products = [tape.apply("*", *pair) for pair in pairs]
+    assert len({product.number for product in products}) == 3
+
+
+def test_what_is_known_vanishes():
+    tape = Tape()
+    x = SymbolArray([tape.input("x", 0)])
+    for none in (0 * x, x - x, 0.0 / (1 + x)):
+        assert flat(none) == [0.0]
+    for same in (1 * x, x + 0, x**1, 0 - (0 - x), np.where(True, x, 2 * x)):
+        assert flat(same) == flat(x)
+    assert flat(x * np.sign(x)) == flat(np.abs(x))
+    assert flat(2 * (3 * x)) == flat(6 * x)
+    with pytest.raises(SettingError, match=r"numpy.round cannot be written"):
+        np.round(x)

@@ -69,6 +69,7 @@ def test_a_value_and_its_sigma_are_one_more_measurement(noisy, grouping, acronym
         np.testing.assert_allclose(np.diag(found.own_covariance)[k], 1 / (1 / inverse[k, k] + 1 / 0.002**2), rtol=1e-4)
 
 
+@pytest.mark.thorough
 def test_sigma_is_right_where_the_prior_is(log, grouping, values):
     """200 values drawn from the prior, and 200 noises: the errors of a log of 10 s over sigma are 1 within a seventh."""
     rng, short, z = np.random.default_rng(2), log.part(0, 1000), []

@@ -12,6 +12,7 @@ from idbench.sim.robot.mounting import Mounting, locked
 from idbench.sim.robot.rewrite import rewritten
 from idbench.sim.robot.robot import Robot
 from idbench.sim.robot.tree import kinematic_tree
+from idbench.sim.robot.write_urdf import urdf_text
 
 SOLID = '<inertial><mass value="1"/><inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial>'
 
@@ -224,3 +225,57 @@ def test_an_arm_with_classes_a_gripper_by_tendon_and_keyframes_reads(load_robot,
     assert kinematic_tree(robot).joints[1].armature
     (tmp_path / "out.xml").write_text(rewritten(str(tmp_path / "arm.xml"), {"M2": 2.5}, tmp_path, mounting))
     assert Robot.load(str(tmp_path / "out.xml")).joints == ("joint1", "joint2")
+
+
+FINGER = """<body name="{0}" pos="0 {1} .2"><joint name="{0}" axis="1 0 0"/>
+<inertial pos="0 0 .1" mass=".1" diaginertia=".01 .01 .01"/></body>"""
+
+GRIPPER = f"""<mujoco><worldbody><body name="arm"><joint name="arm" axis="0 0 1"/>
+<inertial pos="0 0 .1" mass="1" diaginertia=".1 .1 .1"/>{FINGER.format("left", 0.1)}{FINGER.format("right", -0.1)}
+</body><body name="hand" mocap="true"/></worldbody><equality>{{}}</equality></mujoco>"""
+
+
+@pytest.mark.parametrize(
+    ("tie", "open_"),
+    [
+        ('<connect body1="left" body2="right" anchor="0 0 .1"/>', True),
+        ('<weld body1="left" body2="right"/>', True),
+        ('<weld body1="arm" body2="hand"/>', True),
+        ('<weld body1="arm"/>', False),
+    ],
+    ids=["connect", "weld", "mocap", "world"],
+)
+def test_ties_of_bodies_that_move_as_one_are_left_out_and_said(load_robot, tie, open_):
+    """A gripper of four bars on an arm of which the arm alone was logged; a weld to a mocap body, as in teleoperation."""
+    held = Mounting(joints=("arm",))
+    if not open_:
+        with pytest.raises(RobotError, match="closes a chain"):
+            kinematic_tree(load_robot(GRIPPER.format(tie), held.edit, name="arm.xml"))
+        return
+    robot = load_robot(GRIPPER.format(tie), held.edit, name="arm.xml")
+    assert [joint.name for joint in kinematic_tree(robot).joints] == ["arm"]
+    assert len(robot.notes) == 1
+    assert "ties that hold nothing that moves" in robot.notes[0]
+    with pytest.raises(RobotError, match="closes a chain"):
+        kinematic_tree(load_robot(GRIPPER.format('<connect body1="left" body2="right" anchor="0 0 .1"/>'), name="arm.xml"))
+
+
+def test_prefixes_that_nothing_declares_are_read_and_written(load_robot, tmp_path):
+    drake = '<drake:reducing_gear value="1"/></joint>'
+    text = urdf("", SOLID).replace("</joint>", drake)
+    robot = load_robot(text)
+    assert robot.joints == ("j1",)
+    assert "drake:reducing_gear" in urdf_text(str(tmp_path / "arm.urdf"), robot, kinematic_tree(robot), {}, Mounting())
+
+
+def test_a_line_that_is_named_is_that_of_the_file(load_robot):
+    shape = "<visual>\n<geometry>\n<box size='1 1 1'/>\n</geometry>\n</visual>"
+    text = "<!-- one\ntwo -->\n" + urdf(shape, SOLID).replace('upper="2"', '\n\nupper="two"')
+    with pytest.raises(RobotError, match=r"upper.* line 7"):
+        load_robot(text)
+
+
+def test_a_part_of_a_file_names_the_file_to_give(load_robot, tmp_path):
+    (tmp_path / "scene.xml").write_text('<mujoco><include file="part.xml"/></mujoco>')
+    with pytest.raises(RobotError, match=r"a part that another includes: give .*scene\.xml"):
+        load_robot("<mujocoinclude><body/></mujocoinclude>", name="part.xml")

@@ -98,9 +98,9 @@ def closed_loop(run, **others):
     inertial = 1.04 * 0.1404**2 + 0.0013, 1.04 * 0.1404 * 9.81, 0.0, 0.0
     on = run.log.conditions["on"][:, 0] > 0.5 if "on" in run.log.conditions else None
     load_ = JointLoad(*map(np.array, inertial))
-    log = ServoRun(run.log.t, run.log.q[0, :, 0], run.log.conditions["command"][0, :, 0], load_, 16.0, on)
-    servo = Servo(0.166, supply=12.0, duty_limit=0.97, counts=2**24)
-    return ServoLoop(servo, [log], 5e-4).simulate(LAW | others)[0, 0]
+    servo = Servo(0.166, 16.0, supply=12.0, limit=0.97)
+    log = ServoRun(run.log.t, run.log.q[0, :, 0], run.log.conditions["command"][0, :, 0], load_, servo, on)
+    return ServoLoop([log], 5e-4).simulate(LAW | others)[0, 0]
 
 
 @pytest.mark.thorough
@@ -146,7 +146,7 @@ def test_a_watcher_receives_back_emf_and_gap():
 def test_a_log_has_commands_and_when_torque_was_off(tmp_path):
     run = simulate(replace(load("servo"), trajectory=replace(load("servo").trajectory, steps=10)))
     write_log(run.alone(), tmp_path / "log.csv", ("swing",))
-    columns = read_servo_log(tmp_path / "log.csv", {}, {})
+    columns, _ = read_servo_log(tmp_path / "log.csv", {}, {})
     np.testing.assert_allclose(columns.command[:, 0], run.reference.q[:, 0])
     off = np.any([(columns.t >= a - 1e-9) & (columns.t < b - 1e-9) for a, b in load("servo").drive.off], axis=0)
     assert 0 < off.mean() < 1

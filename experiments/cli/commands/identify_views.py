@@ -17,7 +17,7 @@ from idbench.experiments.recording.audience import Audience
 from idbench.experiments.results.attempts import Attempts
 from idbench.experiments.results.folder import RECORDING, ResultsFolder
 from idbench.experiments.results.page import Page
-from idbench.experiments.results.writing import Manifest, require_free, write_text
+from idbench.experiments.results.writing import Manifest, folder_for, write_text
 
 
 @final
@@ -113,24 +113,33 @@ def view_all(shown: Shown, attempts: Attempts) -> None:
     """Make every view; those that fail are noted."""
     for name, view in VIEWS.items():
         attempts.attempt(name, lambda view=view: view(shown, attempts))  # type: ignore[misc]
+    told = set[str]()
     for option, path in _targets(shown.options):
-        attempts.attempt(f"{option} {path}", lambda option=option, path=path: _export(shown, option, path))  # type: ignore[misc]
+        attempts.attempt(f"{option} {path}", lambda option=option, path=path: _export(shown, option, path, told))  # type: ignore[misc]
     if shown.folder:
         hint = shown.options.watching.hint(shown.folder.out)
         shown.page.print(f"written to {shown.folder.out}{hint}", soft_wrap=True)
     shown.page.show()
 
 
-def _export(shown: Shown, option: str, path: Path) -> None:
+def _export(shown: Shown, option: str, path: Path, told: set[str]) -> None:
     """Write a file for other software, with the parameters of the first model that has an estimate."""
-    what, render, _ = EXPORTS[path.suffix]
-    text, warnings = render(shown.fit, shown.fit.leading, path)
-    if shown.folder and shown.folder.goes_beside(path, option):
-        shown.folder.add(path.name, text)
-    else:
-        write_text(path, text, option, force=shown.options.force, read=shown.folder.read if shown.folder else ())
-    shown.page.print(Text(f"written to {path}: {what} with the parameters of the {shown.fit.leading} model"), soft_wrap=True)
-    shown.page.warn({"the file that was written": warnings})
+    export = EXPORTS[path.suffix]
+    made = export.render(shown.fit, shown.fit.leading, path)
+    if path not in made.texts:  # a folder of files
+        folder_for(path, option)
+    for target, text in made.texts.items():
+        if shown.folder and shown.folder.goes_beside(target, option):
+            shown.folder.add(target.name, text)
+        else:
+            write_text(target, text, option, force=shown.options.force, read=shown.folder.read if shown.folder else ())
+    named = ", ".join(map(str, made.texts if path in made.texts else [path]))
+    what = f"{export.what} with the parameters of the {shown.fit.leading} model"
+    shown.page.print(Text(f"written to {named}: {what}"), soft_wrap=True)
+    for note in (note for note in made.notes if note not in told):
+        shown.page.print(Text(note), soft_wrap=True)
+    told.update(made.notes)
+    shown.page.warn({"the file that was written": made.warnings})
 
 
 def _targets(options: Identify) -> list[tuple[str, Path]]:
@@ -147,8 +156,8 @@ def require_targets(options: Identify, robot_model: RobotModel, folder: ResultsF
         if path.suffix not in EXPORTS:
             raise ExperimentError(f"--write {path}: its name must end with {', '.join(EXPORTS)}")
         if not (folder and folder.goes_beside(path, option)):
-            require_free(path, option, force=options.force, read=read)
-        EXPORTS[path.suffix][2](robot_model, path)
-    targets = [path.absolute() for _, path in _targets(options)]
+            EXPORTS[path.suffix].require_free(path, option, force=options.force, read=read)
+        EXPORTS[path.suffix].require(robot_model, path)
+    targets = [path.absolute() for _, asked in _targets(options) for path in EXPORTS[asked.suffix].paths(asked)]
     if twice := next((path for k, path in enumerate(targets) if path in targets[:k]), None):
         raise ResultsError(f"{twice} is to be written twice: give each file a name of its own")

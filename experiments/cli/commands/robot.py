@@ -36,18 +36,19 @@ def describe(options: DescribeRobot) -> None:
         sys.stderr.write(f"idbench: grouping the parameters of {robot_model.robot.n} joints takes a while\n")
     truth = robot_model.truth(robot_model.robot)
     _print_joints(page, robot_model)
-    _print_parameters(page, robot_model, truth)
+    counts = _operations(robot_model.basis)
+    _print_parameters(page, robot_model, truth, counts)
     try:
         moves = RandomMoves(moves=20, durations=(0.8, 1.6), velocity=(2.0,)).sample(robot_model.robot, 100.0)
         _print_budget(page, Budget(robot_model.robot, moves))
     except BenchError as error:  # the parameters are worth knowing all the same
         page.print(Text(f"no torque budget: {error}"), soft_wrap=True)
     page.warn({FILE: warnings_of_robot(robot_model.robot)})
-    page.found |= _summary(robot_model, truth)
+    page.found |= _summary(robot_model, truth, counts)
     page.close()
 
 
-def _summary(robot_model: RobotModel, truth: dict[str, float]) -> dict[str, Any]:
+def _summary(robot_model: RobotModel, truth: dict[str, float], counts: dict[str, Operations]) -> dict[str, Any]:
     """Return what --json says of a robot."""
     tree = robot_model.tree
     return {
@@ -60,7 +61,7 @@ def _summary(robot_model: RobotModel, truth: dict[str, float]) -> dict[str, Any]
             {"name": p.name, "unit": p.unit, "kind": p.kind, "joint": p.joint, "value": truth[p.name]}
             for p in robot_model.basis.parameters
         ],
-        "operations": {model: asdict(counts) for model, counts in _operations(robot_model.basis).items()},
+        "operations": {model: asdict(each) for model, each in counts.items()},
         "made_of": robot_model.grouping.groupings,
     }
 
@@ -86,7 +87,7 @@ def _print_joints(page: Console, robot_model: RobotModel) -> None:
         page.print(Text(why + more))
 
 
-def _print_parameters(page: Console, robot_model: RobotModel, truth: dict[str, float]) -> None:
+def _print_parameters(page: Console, robot_model: RobotModel, truth: dict[str, float], counts: dict[str, Operations]) -> None:
     basis, base = robot_model.basis, robot_model.grouping
     grid = new_table("", ["of the file", "unit"])
     grid.add_column("made of")
@@ -95,7 +96,7 @@ def _print_parameters(page: Console, robot_model: RobotModel, truth: dict[str, f
     print_titled(page, f"{len(basis.names)} parameters that a motion can identify", grid)
     if base.without_effect:
         page.print(Text(f"no motion excites {', '.join(base.without_effect)}"), soft_wrap=True)
-    if counts := _operations(basis):
+    if counts:
         page.print(Text(f"operations per sample: {'; '.join(f'{model} {x}' for model, x in counts.items())}"), soft_wrap=True)
     page.print()
 

@@ -19,7 +19,6 @@ from idbench.experiments.reports.estimates import shown_whole
 from idbench.experiments.reports.printed import print_fit
 from idbench.experiments.results.folder import ResultsFolder
 from idbench.experiments.results.page import Page, new_page, shown, stages_of
-from idbench.experiments.servo.identification import servo_toml, write_commands
 from idbench.experiments.study.one_run import files_of, run_of
 from idbench.identify.files.log_file import write_log
 from idbench.sim.drives import ServoDrive
@@ -63,6 +62,8 @@ def _files(ran: ScenarioRun) -> Files:
     files: Files = {"log.parquet": partial(write_log, ran.run.alone()), "scenario.toml": partial(write_scenario, ran.scenario)}
     if not isinstance(drive, ServoDrive):
         return files
+    from idbench.experiments.servo.identification import servo_toml, write_commands  # half a second that others do not need
+
     known = {"servo.toml": lambda path: path.write_text(servo_toml(drive, robot))}
     return {**files, **known, "commands.csv": partial(write_commands, ran.run, robot)}
 

@@ -20,17 +20,15 @@ from idbench.experiments.results.writing import require_free, write_text
 from idbench.experiments.servo.identification import Servos
 from idbench.experiments.servo.job import ServosFit, files_of, servos_identified
 from idbench.experiments.servo.joints import Identified
-from idbench.experiments.servo.servo_text import (
+from idbench.experiments.servo.servo_files import (
+    for_mujoco,
     in_mujoco,
     inexpressible,
     mjcf_of,
-    print_choice,
-    print_errors,
-    print_servos,
     servo_function,
-    warnings_of,
     without_servo,
 )
+from idbench.experiments.servo.servo_text import print_choice, print_errors, print_servos, warnings_of
 from idbench.identify.servo import ServoFit
 from idbench.identify.servo.choice import ServoFrictionChoice
 
@@ -89,7 +87,10 @@ def _identified(page: Page, folder: ResultsFolder | None, options: IdentifyServo
     finally:
         if last and last[0].fits:
             print_servos(page, last[0].every)
-    page.warn({"the servos": warnings_of(made.every)})
+    for note in made.servos.notes:
+        page.print(Text(note), soft_wrap=True)
+    doubts = [*made.servos.doubts, *(made.others.doubts if made.others else [])]
+    page.warn({"the log": doubts, "the servos": warnings_of(made.every, made.mistakes)})
     return made
 
 
@@ -98,17 +99,14 @@ def _write(page: Page, options: IdentifyServo, servos: Servos, others: Servos | 
     path = options.write_mjcf
     assert path is not None
     place = path.absolute().parent
+    found = for_mujoco(found)
     text = mjcf_of(servos, found, place, options.position)
     write_text(path, text, "--write-mjcf", force=options.force, read=files_of(options))
     page.print(Text(f"written to {path}: the robot with its servos, to be commanded with angles of the file"), soft_wrap=True)
     page.warn({"the written file": [*inexpressible(found), *without_servo(servos.links.joints, found)]})
     judged = others or servos
     for log in judged.logs:
-        try:
-            errors = in_mujoco(judged, text, place, found, log)
-        except ExperimentError as error:  # other logs may be of the gain that was written
-            page.warn({"the written file": [str(error)]})
-            continue
+        errors = in_mujoco(judged, found, place, log, options.position)
         name = judged.name(log)
         page.found.setdefault("mujoco_error", {})[name] = errors
         print_errors(page, f"{path.name} in plain MuJoCo, {name}", {joint: np.array([e]) for joint, e in errors.items()})

@@ -63,8 +63,9 @@ class Identify(jobs.IdentifyRequest, RecordedOptions, Command, action="identify:
     """Write the robot's MJCF file with the identified inertias, armatures and frictions of the first model, made physically
     consistent."""
     write: Files = ()
-    """Files to write: .urdf or .xml, the identified robot; .json, base parameters with covariance and regressor; .py, the
-    inverse dynamics as a function that needs only NumPy."""
+    """Files to write. The identified robot: .xml, .urdf or .sdf; its joints' actuators: .yaml. For a controller, dynamics and
+    regressors as functions: .c, .py. Base parameters with their covariance: .json. For training, ranges with code: .toml; a
+    folder of robots: .ensemble."""
 
 
 @command("table1")
@@ -137,7 +138,7 @@ class IdentifyGains(jobs.GainsRequest, WrittenOptions, Command, action="loads:ga
 @final
 @dataclass(frozen=True, kw_only=True)
 class IdentifyServo(jobs.ServoRequest, RecordedOptions, Command, action="servo:servo"):
-    """Identify position-controlled joints (Feetech, Dynamixel) from commands and positions alone; write them for MuJoCo."""
+    """Identify joints under position loops (servos, legs, MuJoCo's actuators) from commands and positions; write them."""
 
     write_mjcf: File = None
     """Write the robot's MJCF file with these servos as `dcmotor` actuators, and measure it on a log in plain MuJoCo."""

@@ -83,6 +83,30 @@ class Export(Command, action="logs:export"):
     """Replace existing files."""
 
 
+@command("device")
+@final
+@dataclass(frozen=True)
+class ShowDevice(Command, action="device:device"):
+    """Print a servo that was identified from public logs, with standard errors, or list them; write it for MuJoCo."""
+
+    name: Annotated[str, Word("NAME", positional=True)] = ""
+    """Of the device. Default: list all."""
+    robot: Annotated[str | None, Word("ROBOT")] = None
+    """Robot that it drives: name, or file (MJCF or URDF). Default: a pendulum."""
+    joints: Annotated[tuple[str, ...], Word("JOINT")] = ()
+    """Joints that it drives. Default: all."""
+    kp: float = 16.0
+    """Gain of the firmware."""
+    write_mjcf: File = None
+    """Write the robot's MJCF with the device as `dcmotor` actuators."""
+    write: File = None
+    """Write a servo.toml of what is known of it."""
+    force: bool = False
+    """Replace existing files."""
+    json: Json = False
+    """Print as JSON, with the covariance; human-readable text goes to the error stream."""
+
+
 @command("robot")
 @final
 @dataclass(frozen=True)

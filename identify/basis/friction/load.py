@@ -44,7 +44,9 @@ class TiedFriction(AbstractBlock):
 
     def dissipation(self, state: State) -> BlockColumns:
         """Return the power of the torques."""
-        power: Array = np.sum([state.qd[..., j, :] * x for (j, _), x in self.remainder(state).items()], axis=0)
+        power = state.qd[..., 0, :] * 0.0
+        for (j, _), torque in self.remainder(state).items():
+            power = power + state.qd[..., j, :] * torque
         return {(0, self._own): power}
 
     @property

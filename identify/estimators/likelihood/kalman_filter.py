@@ -50,7 +50,7 @@ class UnscentedKalmanFilter(AbstractEstimator):
     """
 
     acronym: ClassVar[str] = "UKF"
-    needs: ClassVar[frozenset[Need]] = frozenset({"rows"})
+    needs: ClassVar[frozenset[Need]] = frozenset({"rows", "logs"})
     begins: ClassVar[bool] = True
     filtered: ClassVar[bool] = False
 

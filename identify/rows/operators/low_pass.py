@@ -14,6 +14,7 @@ from idbench.identify.errors import require_below_nyquist, require_positive, req
 from idbench.identify.models import Equations
 from idbench.identify.rows.row_map import Grid, Kernel, RowMap, Window
 from idbench.identify.signals.filters import forward_backward, settling_time
+from idbench.identify.signals.spectra import windowed_sinc
 
 
 class AbstractOperator(ABC):
@@ -118,7 +119,7 @@ class FirLowPass(AbstractLowPass):
 
 @lru_cache(maxsize=16)
 def _taps(half: int, cutoff: float, fs: float) -> Array:
-    return frozen(scipy.signal.firwin(2 * half + 1, cutoff, window="hamming", fs=fs))
+    return frozen(windowed_sinc(2 * half + 1, cutoff, fs))
 
 
 @final

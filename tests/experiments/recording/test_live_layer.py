@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import rerun as rr
 
-from idbench.experiments.identification.fit import fit
+from idbench.experiments.identification.fitting import fit
 from idbench.experiments.identification.logs import Logs
 from idbench.experiments.identification.request import Request
 from idbench.experiments.identification.robot_model import RobotModel

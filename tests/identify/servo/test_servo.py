@@ -1,5 +1,7 @@
 """Servos, against MuJoCo's own: `dcmotor` with input="pos" closes the same loop."""
 
+from dataclasses import replace
+
 import mujoco
 import numpy as np
 import pytest
@@ -8,7 +10,7 @@ from idbench.identify import ExcitationError, IdentificationError, LogError, Set
 from idbench.identify.servo import JointLoad, Servo, ServoRun, identify_servo
 from idbench.identify.servo.run import pieces
 
-SERVO = Servo(0.166, supply=12.0, duty_limit=0.97)
+SERVO = Servo(0.166, supply=12.0, limit=0.97, counts=4096)
 MASS, LENGTH, H, DELAY = 0.6, 0.12, 5e-4, 0.02
 TRUTH = {"a": 0.55, "b": 1.2, "Ia": 0.02, "Fs": 0.1, "rate": 4.5, "delay": DELAY}
 
@@ -33,12 +35,12 @@ def command_at(t: np.ndarray, seed: int) -> np.ndarray:
     return steps + waves
 
 
-def simulated(kp: float, seed: int, seconds: float = 8.0) -> ServoRun:
+def simulated(kp: float, seed: int, seconds: float = 8.0, mass: float = MASS) -> ServoRun:
     """Return a run of MuJoCo's servo, its positions in counts."""
     K = TRUTH["b"] / TRUTH["a"]
     text = MJCF.format(
-        h=H, length=LENGTH, mass=MASS, Ia=TRUTH["Ia"], Fs=TRUTH["Fs"], K=K, R=K / TRUTH["a"], b=TRUTH["b"],
-        kp=SERVO.gain * kp * SERVO.supply * TRUTH["a"], rate=TRUTH["rate"], Vmax=SERVO.duty_limit * SERVO.supply,
+        h=H, length=LENGTH, mass=mass, Ia=TRUTH["Ia"], Fs=TRUTH["Fs"], K=K, R=K / TRUTH["a"], b=TRUTH["b"],
+        kp=SERVO.gain * kp * SERVO.supply * TRUTH["a"], rate=TRUTH["rate"], Vmax=SERVO.limit * SERVO.supply,
     )  # fmt: skip
     model = mujoco.MjModel.from_xml_string(text)
     data = mujoco.MjData(model)
@@ -52,7 +54,7 @@ def simulated(kp: float, seed: int, seconds: float = 8.0) -> ServoRun:
         mujoco.mj_step(model, data)
     every = round(0.01 / H)
     counted = np.round(q[::every] / SERVO.step) * SERVO.step
-    return ServoRun(t[::every], counted, command_at(t[::every], seed), JointLoad.pendulum(MASS, LENGTH), kp)
+    return ServoRun(t[::every], counted, command_at(t[::every], seed), JointLoad.pendulum(MASS, LENGTH), replace(SERVO, kp=kp))
 
 
 @pytest.fixture(scope="module")
@@ -61,7 +63,7 @@ def runs() -> list[ServoRun]:
 
 
 def test_parameters_of_mujocos_servo_are_found(runs: list[ServoRun]) -> None:
-    fit = identify_servo(SERVO, runs, "coulomb")
+    fit = identify_servo(runs, "coulomb")
     # The truth is of first order in H: commands act up to 1.5 steps early, and implicit damping adds b H to the inertia.
     effective = {**TRUTH, "Ia": TRUTH["Ia"] + TRUTH["b"] * H, "delay": DELAY - 1.3 * H}
     for name, true in effective.items():
@@ -72,46 +74,52 @@ def test_parameters_of_mujocos_servo_are_found(runs: list[ServoRun]) -> None:
 
 def test_command_in_degrees_is_refused(runs: list[ServoRun]) -> None:
     run = runs[0]
-    wrong = ServoRun(run.t, run.q, np.rad2deg(run.command), run.load, run.kp)
+    wrong = ServoRun(run.t, run.q, np.rad2deg(run.command), run.load, run.servo)
     with pytest.raises(IdentificationError, match="in degrees"):
-        identify_servo(SERVO, [wrong])
+        identify_servo([wrong])
 
 
 def test_standing_joint_is_refused(runs: list[ServoRun]) -> None:
     run = runs[0]
     with pytest.raises(ExcitationError, match="does not move"):
-        identify_servo(SERVO, [ServoRun(run.t, 0 * run.q, run.command, run.load, run.kp)])
+        identify_servo([ServoRun(run.t, 0 * run.q, run.command, run.load, run.servo)])
 
 
 def test_torque_off_all_the_time_is_refused(runs: list[ServoRun]) -> None:
     run = runs[0]
     with pytest.raises(ExcitationError, match="off all the time"):
-        identify_servo(SERVO, [ServoRun(run.t, run.q, run.command, run.load, run.kp, np.zeros(len(run.t), bool))])
+        identify_servo([ServoRun(run.t, run.q, run.command, run.load, run.servo, np.zeros(len(run.t), bool))])
 
 
 def test_saturated_duty_is_refused(runs: list[ServoRun]) -> None:
     run = runs[0]
     with pytest.raises(ExcitationError, match="at its limit"):
-        identify_servo(SERVO, [ServoRun(run.t, run.q, run.q + 3.0 * np.sign(run.command), run.load, 200.0)])
+        identify_servo([ServoRun(run.t, run.q, run.q + 3.0 * np.sign(run.command), run.load, replace(SERVO, kp=200.0))])
 
 
-def test_joint_without_a_load_is_refused(runs: list[ServoRun]) -> None:
-    run, none = runs[0], np.array(0.0)
-    with pytest.raises(ExcitationError, match="known mass"):
-        identify_servo(SERVO, [ServoRun(run.t, run.q, run.command, JointLoad(none, none, none, none), run.kp)])
+def test_a_joint_without_a_load_is_known_up_to_a_factor(runs: list[ServoRun]) -> None:
+    """Nothing sets the scale of its torques: ratios are found, and positions follow."""
+    load = JointLoad(np.array(MASS * LENGTH**2 * 1e-6), *(np.array(0.0),) * 3)
+    light = [simulated(kp, seed, mass=MASS * 1e-6) for seed, kp in enumerate((8.0, 16.0))]
+    fit = identify_servo([replace(run, load=load) for run in light], "coulomb")
+    assert not fit.scaled
+    assert fit.factor[0] < 0.1
+    assert fit.factor[1] > 10
+    assert fit.p["b"] / fit.p["a"] == pytest.approx(TRUTH["b"] / TRUTH["a"], rel=0.02)
+    assert fit.errors(fit.loop.runs).mean() < 3 * SERVO.step
 
 
 def test_command_with_the_wrong_sign_is_refused(runs: list[ServoRun]) -> None:
     run = runs[0]
     with pytest.raises(IdentificationError, match="sign"):
-        identify_servo(SERVO, [ServoRun(run.t, run.q, -run.command, run.load, run.kp)])
+        identify_servo([ServoRun(run.t, run.q, -run.command, run.load, run.servo)])
 
 
 def test_unknown_names_are_refused(runs: list[ServoRun]) -> None:
     with pytest.raises(SettingError, match="coulomb"):
-        identify_servo(SERVO, runs, "sticky")
+        identify_servo(runs, "sticky")
     with pytest.raises(SettingError, match="no parameter"):
-        identify_servo(SERVO, runs, "load", ("gap",))
+        identify_servo(runs, "load", ("gap",))
 
 
 def test_time_that_stands_is_refused(runs: list[ServoRun]) -> None:
@@ -119,15 +127,15 @@ def test_time_that_stands_is_refused(runs: list[ServoRun]) -> None:
     t = run.t.copy()
     t[5] = t[4]
     with pytest.raises(LogError, match="does not increase"):
-        ServoRun(t, run.q, run.command, run.load, run.kp)
+        ServoRun(t, run.q, run.command, run.load, run.servo)
 
 
 def test_pieces_begin_at_rest_and_leave_nothing_out_that_moves():
     t = np.arange(0, 6, 0.01)
     command = np.repeat([0.0, 0.5, -0.3], 200)
     q = np.interp(t, [0, 2, 2.5, 4, 4.5, 6], [0.0, 0.0, 0.5, 0.5, -0.3, -0.3])
-    run = ServoRun(t, q, command, JointLoad.pendulum(0.5, 0.1), 16.0)
-    parts = pieces(run, 2 * np.pi / 4096, 0.03)
+    run = ServoRun(t, q, command, JointLoad.pendulum(0.5, 0.1), SERVO)
+    parts = pieces(run, 0.03)
     assert all(part.q[0] == part.q[1] and part.command[0] == part.command[1] for part in parts)
     assert sum(np.abs(np.diff(part.q)).sum() for part in parts) == pytest.approx(1.3)
     assert max(part.t[-1] - part.t[0] for part in parts) < 2.5
@@ -135,8 +143,8 @@ def test_pieces_begin_at_rest_and_leave_nothing_out_that_moves():
 
 def test_a_run_that_never_rests_is_one_piece():
     t = np.arange(0, 6, 0.01)
-    run = ServoRun(t, np.sin(t), np.sin(t), JointLoad.pendulum(0.5, 0.1), 16.0)
-    assert len(pieces(run, 2 * np.pi / 4096, 0.03)) == 1
+    run = ServoRun(t, np.sin(t), np.sin(t), JointLoad.pendulum(0.5, 0.1), SERVO)
+    assert len(pieces(run, 0.03)) == 1
 
 
 def test_pieces_begin_when_a_late_command_has_arrived():
@@ -144,8 +152,8 @@ def test_pieces_begin_when_a_late_command_has_arrived():
     t = np.arange(0, 6, 0.01)
     command = np.repeat([0.0, 0.5, -0.3], 200)
     q = np.interp(t, [0, 2.3, 2.8, 4.3, 4.8, 6], [0.0, 0.0, 0.5, 0.5, -0.3, -0.3])
-    run = ServoRun(t, q, command, JointLoad.pendulum(0.5, 0.1), 16.0)
-    starts = [part.t[0] for part in pieces(run, 2 * np.pi / 4096, 0.3)][1:]
+    run = ServoRun(t, q, command, JointLoad.pendulum(0.5, 0.1), SERVO)
+    starts = [part.t[0] for part in pieces(run, 0.3)][1:]
     assert len(starts) > 0
     changed = np.array([2.0, 4.0])
     assert all(not ((changed < s) & (changed > s - 0.4)).any() for s in starts)
@@ -154,8 +162,8 @@ def test_pieces_begin_when_a_late_command_has_arrived():
 def test_the_only_motion_of_a_log_is_kept():
     """A step at once, and then rest: without the step there would be nothing."""
     t = np.arange(0, 2, 0.01)
-    run = ServoRun(t, np.interp(t, [0, 0.3], [0.0, 0.5]), np.full(200, 0.5), JointLoad.pendulum(0.5, 0.1), 16.0)
-    assert np.ptp(pieces(run, 2 * np.pi / 4096, 0.03)[0].q) == pytest.approx(0.5)
+    run = ServoRun(t, np.interp(t, [0, 0.3], [0.0, 0.5]), np.full(200, 0.5), JointLoad.pendulum(0.5, 0.1), SERVO)
+    assert np.ptp(pieces(run, 0.03)[0].q) == pytest.approx(0.5)
 
 
 def test_a_motion_that_was_under_way_when_the_log_began_is_left_out():
@@ -166,5 +174,5 @@ def test_a_motion_that_was_under_way_when_the_log_began_is_left_out():
     moving = still + 0.1 * np.clip(1 - t / 0.3, 0, None)
     load = JointLoad.pendulum(0.5, 0.1)
     for q in (moving, still):
-        parts = pieces(ServoRun(t, q, command, load, 16.0), 2 * np.pi / 4096, 0.03)
+        parts = pieces(ServoRun(t, q, command, load, SERVO), 0.03)
         assert sum(np.abs(np.diff(part.q)).sum() for part in parts) == pytest.approx(1.3)

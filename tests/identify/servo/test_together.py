@@ -1,11 +1,12 @@
 """Offsets of the joints of an arm that depend on each other."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from idbench.identify.servo import Servo, ServoFit
+from idbench.identify.servo import ServoFit
 from idbench.identify.servo.identification import OffsetJoint, together
 from idbench.identify.servo.search import Found
 
@@ -17,7 +18,8 @@ PLACE = FREE.index("offset")
 def fit_of(covariance, free=FREE):
     p = dict(zip(FREE, [10.0, 0.0, 0.0] + 0.2 * RNG.normal(size=3), strict=True))  # far from all limits
     found = Found(p, 0.0, None, None, None)
-    return ServoFit(Servo(0.166, 16.0, 12.0), "coulomb", free, found, None, None, np.inf, covariance)
+    loop = SimpleNamespace(limits=lambda limits, free: limits)
+    return ServoFit("coulomb", free, found, loop, None, (np.inf, np.inf), covariance)
 
 
 def covariance(n=3):

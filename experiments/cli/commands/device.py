@@ -1,0 +1,57 @@
+"""Servos that were identified from public logs, and files of them."""
+
+from rich.text import Text
+
+from idbench.experiments.cli.options.tools import ShowDevice
+from idbench.experiments.errors import ExperimentError
+from idbench.experiments.identification.robot_model import absolute
+from idbench.experiments.results.page import Page, new_page
+from idbench.experiments.results.writing import require_free, write_text
+from idbench.experiments.servo.device import BENCH, device_of, devices, mjcf_of_device, servo_toml_of
+from idbench.experiments.text import new_table, number, print_titled
+from idbench.sim.robot.robot import Robot
+
+
+def device(options: ShowDevice) -> None:
+    """List devices, or print one, and write its files."""
+    page = new_page(machine=options.json)
+    for option, path, ending in (("--write-mjcf", options.write_mjcf, ".xml"), ("--write", options.write, ".toml")):
+        if path is not None:
+            if path.suffix != ending:
+                raise ExperimentError(f"{option} {path}: its name must end with {ending}")
+            require_free(path, option, force=options.force)
+    if not options.name:
+        page.found |= {"devices": list(devices())}
+        for name, known in devices().items():
+            page.print(Text(f"{name}: {known['source']}"), soft_wrap=True)
+        page.close()
+        return
+    page.found |= device_of(options.name)
+    _print(page, options.name)
+    if options.write_mjcf is not None:
+        robot = absolute(options.robot or BENCH)
+        names = Robot.load(robot).joints
+        if wrong := [joint for joint in options.joints if joint not in names]:
+            raise ExperimentError(f"--joints {wrong[0]}: {robot} has no such joint; it has {', '.join(names)}")
+        places = [names.index(joint) for joint in options.joints or names]
+        text = mjcf_of_device(device_of(options.name), robot, places, options.kp, options.write_mjcf.absolute().parent)
+        write_text(options.write_mjcf, text, "--write-mjcf", force=options.force)
+        page.print(f"written to {options.write_mjcf}: {options.name} at {', '.join(names[j] for j in places)}", soft_wrap=True)
+    if options.write is not None:
+        write_text(options.write, servo_toml_of(device_of(options.name)), "--write", force=options.force)
+        page.print(f"written to {options.write}: what is known of it, for idbench servo --servo", soft_wrap=True)
+    page.close()
+
+
+def _print(page: Page, name: str) -> None:
+    known = device_of(name)
+    grid = new_table("", ["value", "sigma", "spread between units"])
+    for letter, of in known["parameters"].items():
+        sigma, spread = ("" if x is None else f"{x:.2g}" for x in (of["sigma"], of["spread"]))
+        grid.add_row(f"{letter} [{of['unit']}]", number(of["value"]), sigma, spread)
+    units = f"{known['units']} unit{'s' if known['units'] > 1 else ''}"
+    print_titled(page, f"{name}, {units}, friction law {known['friction']}", grid)
+    page.print(Text(known["source"]), soft_wrap=True)
+    page.print(f"mean error of the position in runs that fits did not see: {known['held_out_error']:.2g} rad", soft_wrap=True)
+    if known["units"] == 1:
+        page.print("one unit was logged: what others of the same model differ by is not known", soft_wrap=True)

@@ -1,0 +1,251 @@
+"""Ranges of an ensemble: a file of means, sigma, quantiles and correlations, and code for training frameworks."""
+
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tomli_w
+
+from idbench.experiments.exports.ensemble import DRAWS, LENGTH, Ensemble, FreeRuns
+from idbench.experiments.identification.robot_model import RobotModel
+from idbench.experiments.reports.panels import Panel, figure
+from idbench.identify import Array
+from idbench.sim.robot.tree import standard_parameters
+from idbench.sim.robot.varied import model_fields
+
+PICTURE = "_band.svg"
+"""Ending of the name of the picture of the band."""
+
+QUANTILES = (0.025, 0.5, 0.975)
+"""The middle of a value, and the ends of the range that holds 95 % of the robots."""
+
+DIGITS = 6
+"""Significant digits: draws scatter by far more."""
+
+JOINT = {"armature": "dof_armature", "damping": "dof_damping", "frictionloss": "dof_frictionloss"}
+"""What a joint has -> MuJoCo's field."""
+
+
+def texts(ensemble: Ensemble, path: Path) -> dict[Path, str]:
+    """Return the texts of the ranges, and of the code that takes them, by their paths."""
+    table = ranges(ensemble)
+    about = f"{ensemble.fit.robot_model.tree.name}, identified by idbench {version('idbench')}"
+    made = {path: tomli_w.dumps(table)}
+    for ending, make in CODE.items():
+        made[path.with_name(path.stem + ending)] = make(table, about)
+    if ensemble.bands:
+        made[path.with_name(path.stem + PICTURE)] = picture(ensemble.bands[0], ensemble.fit.robot_model)
+    return made
+
+
+def picture(runs: FreeRuns, robot_model: RobotModel) -> str:
+    """Return the band about a held-out log as SVG: how far free runs are from it, one run after the other."""
+    panels = list[Panel]()
+    count, samples, _ = runs.q.shape
+    time = LENGTH * (np.arange(count)[:, None] + np.arange(samples) / samples)
+    for j, (joint, held) in enumerate(zip(robot_model.robot.joints, runs.held, strict=True)):
+        panel = Panel(
+            f"{joint}: {100 * held:.0f} % of the instants held, width {runs.width[j]:.2g} (+-20 %: {runs.usual[j]:.2g})"
+        )
+        for edge, label in ((runs.low, "95 % of the robots"), (runs.high, "")):
+            off = edge[..., j] - runs.q[..., j]
+            off[:, 0] = np.nan  # no line from the end of a run to the next
+            panel.line(time.ravel(), off.ravel(), "#2ca02c", 1.2, label)
+        panel.line(np.array([0.0, LENGTH * count]), np.zeros(2), "#444444", 1.0, "log")
+        panels.append(panel)
+    units = {robot_model.units(j)[1] for j in range(robot_model.robot.n)}
+    return figure(panels, 1.5, "time of free runs [s]", f"robots - log [{', '.join(sorted(units))}]")
+
+
+def ranges(ensemble: Ensemble) -> dict[str, Any]:
+    """Return mean, sigma and quantiles of the values of joints and bodies, and how these are correlated."""
+    robot_model, standard = ensemble.fit.robot_model, ensemble.standard
+    robot = robot_model.robot
+    known = standard_parameters(robot)
+    fields = model_fields(robot, {name: x for name, x in standard.items() if name in known})
+    sizes, times = ensemble.disturbance
+    joints: dict[str, Any] = {}
+    bodies: dict[str, Any] = {}
+    columns: dict[str, Array] = {}
+    for j, joint in enumerate(robot.joints):
+        own = {name: fields[field][:, j] for name, field in JOINT.items()}
+        columns |= {f"{joint}.{name}": x for name, x in own.items()}
+        joints[joint] = {name: _told(x) for name, x in own.items()}
+        joints[joint]["disturbance"] = {"rms": _short(sizes[j]), "correlation_time": _short(times[j])}
+    for k in sorted({int(body) for body in robot.model.jnt_bodyid[: robot.n]}):
+        body = robot.model.body(k).name or f"body{k}"
+        own = {"mass": fields["body_mass"][:, k]}
+        own |= {f"com_{x}": fields["body_ipos"][:, k, i] for i, x in enumerate("xyz")}
+        own |= {f"inertia_{i + 1}": fields["body_inertia"][:, k, i] for i in range(3)}
+        columns |= {f"{body}.{name}": x for name, x in own.items()}
+        bodies[body] = {name: _told(x) for name, x in own.items()}
+    varied = {name: x for name, x in columns.items() if np.ptp(x) > 1e-9 * np.abs(x).max(initial=1e-300)}
+    matrix = np.atleast_2d(np.corrcoef(np.stack(list(varied.values())))) if varied else np.empty((0, 0))
+    return {
+        "about": (
+            f"{DRAWS} physically consistent robots, seed {ensemble.seed}. Units: kg, m, kg m^2, N m, N m s/rad (slides: N, "
+            "N s/m); com and principal inertias in the frame of MuJoCo's body; disturbance: torque that the model does not "
+            "explain [N m] and the time over which it is alike [s]."
+        ),
+        "spread": _short(ensemble.spread),
+        "free_run": LENGTH,
+        "bands": [
+            {
+                "on": band.title,
+                "held": dict(zip(robot.joints, map(_short, band.held), strict=True)),
+                "width": dict(zip(robot.joints, map(_short, band.width), strict=True)),
+                "width_of_20_percent": dict(zip(robot.joints, map(_short, band.usual), strict=True)),
+            }
+            for band in ensemble.bands
+        ],
+        "joints": joints,
+        "bodies": bodies,
+        "correlations": {"of": list(varied), "matrix": [[round(float(x), 3) for x in row] for row in matrix]},
+    }
+
+
+def _told(x: Array) -> dict[str, float]:
+    low, middle, high = np.quantile(x, QUANTILES)
+    return {
+        "mean": _short(x.mean()),
+        "sigma": _short(x.std()),
+        "low": _short(low),
+        "middle": _short(middle),
+        "high": _short(high),
+    }
+
+
+def _short(x: Any) -> float:
+    return float(f"{float(x):.{DIGITS}g}")
+
+
+def _pairs(table: dict[str, Any], part: str, value: str) -> str:
+    """Return the ranges of a value of joints or bodies, as code."""
+    found = {name: (own[value]["low"], own[value]["high"]) for name, own in table[part].items()}
+    return "{\n" + "".join(f"    {name!r}: {ends},\n" for name, ends in found.items()) + "}"
+
+
+def _tables(table: dict[str, Any]) -> str:
+    values = {**dict.fromkeys(JOINT, "joints"), "mass": "bodies"}
+    lines = [f"{value.upper()} = {_pairs(table, part, value)}\n" for value, part in values.items()]
+    return "\n".join(lines)
+
+
+HEAD = '''"""Ranges of {about}, for {target}: 95 % of {draws} robots.
+
+Values are drawn one by one here. They are correlated: where that matters, load robots of the ensemble instead.
+"""
+
+{imports}
+
+{tables}
+
+'''
+
+
+def _headed(table: dict[str, Any], about: str, target: str, imports: str, code: str) -> str:
+    head = HEAD.format(about=about, target=target, draws=DRAWS, imports=imports, tables=_tables(table))
+    return head + code.strip() + "\n"
+
+
+def _mjlab(table: dict[str, Any], about: str) -> str:
+    imports = (
+        "import re\n\nfrom mjlab.envs.mdp import dr\nfrom mjlab.managers.event_manager import EventTermCfg\n"
+        "from mjlab.managers.scene_entity_config import SceneEntityCfg"
+    )
+    code = '''
+def _event(function, ranges, entity):
+    params = {"ranges": {re.escape(name): x for name, x in ranges.items()}, "operation": "abs"}
+    return EventTermCfg(mode="startup", func=function, params={**params, "asset_cfg": SceneEntityCfg(entity)})
+
+
+def events(entity="robot"):
+    """Return event terms for the events of an environment's configuration."""
+    return {
+        "identified_armature": _event(dr.joint_armature, ARMATURE, entity),
+        "identified_damping": _event(dr.joint_damping, DAMPING, entity),
+        "identified_friction": _event(dr.joint_friction, FRICTIONLOSS, entity),
+        "identified_mass": _event(dr.body_mass, MASS, entity),
+    }
+'''
+    return _headed(table, about, "mjlab", imports, code)
+
+
+def _isaaclab(table: dict[str, Any], about: str) -> str:
+    imports = "import re\n\nimport isaaclab.envs.mdp as mdp\nfrom isaaclab.managers import EventTermCfg, SceneEntityCfg"
+    code = '''
+def events(entity="robot"):
+    """Return event terms, by name, for the events of an environment's configuration.
+
+    FRICTIONLOSS is the Coulomb part of PhysX's friction of joints; DAMPING belongs to the actuator's configuration.
+    """
+    found = {}
+    for joint in ARMATURE:
+        found[f"identified_{joint}"] = EventTermCfg(
+            func=mdp.randomize_joint_parameters,
+            mode="startup",
+            params={
+                "asset_cfg": SceneEntityCfg(entity, joint_names=re.escape(joint)),
+                "armature_distribution_params": ARMATURE[joint],
+                "friction_distribution_params": FRICTIONLOSS[joint],
+                "operation": "abs",
+                "distribution": "uniform",
+            },
+        )
+    for body in MASS:
+        found[f"identified_mass_{body}"] = EventTermCfg(
+            func=mdp.randomize_rigid_body_mass,
+            mode="startup",
+            params={
+                "asset_cfg": SceneEntityCfg(entity, body_names=re.escape(body)),
+                "mass_distribution_params": MASS[body],
+                "operation": "abs",
+            },
+        )
+    return found
+'''
+    return _headed(table, about, "Isaac Lab", imports, code)
+
+
+def _playground(table: dict[str, Any], about: str) -> str:
+    imports = "import jax\nimport jax.numpy as jp"
+    code = '''
+def randomizer(mj_model):
+    """Return what Playground takes as `randomization_fn`, for models that have these joints and bodies by their names."""
+
+    def places(names, of):
+        return jp.array([of(name) for name in names])
+
+    def ends(ranges):
+        low, high = zip(*ranges.values())
+        return jp.array(low), jp.array(high)
+
+    dofs = places(ARMATURE, lambda name: mj_model.jnt_dofadr[mj_model.joint(name).id])
+    bodies = places(MASS, lambda name: mj_model.body(name).id)
+    fields = {
+        "dof_armature": (dofs, *ends(ARMATURE)),
+        "dof_damping": (dofs, *ends(DAMPING)),
+        "dof_frictionloss": (dofs, *ends(FRICTIONLOSS)),
+        "body_mass": (bodies, *ends(MASS)),
+    }
+
+    def randomize(model, rng):
+        def drawn(key):
+            keys = dict(zip(fields, jax.random.split(key, len(fields))))
+            return {
+                name: getattr(model, name).at[at].set(jax.random.uniform(keys[name], low.shape, minval=low, maxval=high))
+                for name, (at, low, high) in fields.items()
+            }
+
+        values = jax.vmap(drawn)(rng)
+        axes = jax.tree_util.tree_map(lambda _: None, model).tree_replace(dict.fromkeys(fields, 0))
+        return model.tree_replace(values), axes
+
+    return randomize
+'''
+    return _headed(table, about, "MuJoCo Playground", imports, code)
+
+
+CODE = {"_mjlab.py": _mjlab, "_isaaclab.py": _isaaclab, "_playground.py": _playground}
+"""Endings of the files of code, and what writes them."""

@@ -1,0 +1,120 @@
+"""Logs become a fit: laws and masks that suit them, parameters that they show, torques that were logged."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from idbench.experiments.identification.causes import Cause
+from idbench.experiments.identification.fit import Fit
+from idbench.experiments.identification.friction_choice import chosen_in_turns, masked_laws, suited_mask
+from idbench.experiments.identification.logs import Logs
+from idbench.experiments.identification.prior_share import chosen_share
+from idbench.experiments.identification.request import Request
+from idbench.experiments.identification.smooth_friction import smoothed
+from idbench.identify import (
+    ESTIMATORS,
+    MODELS,
+    ExcitationError,
+    IdentificationError,
+    Problem,
+    attempt_each,
+)
+from idbench.identify.data.motion_log import never_logged
+from idbench.identify.judge.diagnosis import diagnosed, silent_joint, still_joints, unlogged
+from idbench.identify.judge.stretches import held_out_errors
+from idbench.identify.judge.suspect import Suspect
+
+SPOILT = 0.5
+"""Share of the error of the other joints that is left without the zeros of one, if its torque was not logged. Of a joint that
+nobody drives zeros are right: without them others are not predicted better."""
+
+
+def fit(request: Request, logs: Logs) -> Fit:
+    """Return logs, identified: laws of friction chosen where that is asked for, what the logs do not show left out.
+
+    Raises
+    ------
+    IdentificationError
+        If no model has an estimate.
+    """
+    choice = None
+    if request.robot_model.laws.auto:
+        request, logs, choice = chosen_in_turns(request, logs)
+    if request.robot_model.laws.smooth:
+        request = smoothed(request, logs.fitted)
+    if request.robot_model.share_sought:
+        request = replace(request, share=chosen_share(request, logs.fitted))
+    problem = request.problem(logs.fitted)
+    (speeds, raised), masked = suited_mask(problem), list[str]()
+    if raised:
+        request, before = replace(request, mask_speed=speeds), problem
+        problem = request.problem(logs.fitted)
+        if masked := list(masked_laws(before, problem)):
+            request = replace(request, robot_model=request.robot_model.without(masked))
+            problem = request.problem(logs.fitted)
+    found, silent = _shown(request, logs, problem), list[Suspect]()
+    while found.estimates and (suspect := _silent(found)):
+        logs = found.logs.without_torque(suspect.joint or 0)
+        quiet = _shown(request, logs, request.problem(logs.fitted))
+        silent.append(replace(suspect, held_out=_errors(found, quiet)))
+        found = quiet
+    leading = next(iter(found.outcomes.values()))
+    if not found.estimates and isinstance(leading, IdentificationError):
+        raise _with_its_cause(found, leading)
+    return replace(found, choice=choice, hidden=(*masked, *found.hidden), raised=raised, silent=tuple(silent))
+
+
+def _shown(request: Request, logs: Logs, problem: Problem) -> Fit:
+    """Return the fit of the parameters that the logs show."""
+    found, hidden = _fit(request, logs, problem), list[str]()
+    leading = next(iter(found.outcomes.values()))
+    while isinstance(leading, ExcitationError) and leading.hidden and len(leading.hidden) < len(found.basis.names):
+        hidden += leading.hidden
+        request = replace(found.request, robot_model=found.robot_model.without(leading.hidden))
+        found = _fit(request, logs, request.problem(logs.fitted))
+        leading = next(iter(found.outcomes.values()))
+    return replace(found, hidden=tuple(hidden))
+
+
+def _fit(request: Request, logs: Logs, problem: Problem) -> Fit:
+    found = attempt_each(problem, {name: MODELS.create(name) for name in request.models}, request.solver)
+    return Fit(request, logs, problem, found)
+
+
+def _silent(found: Fit) -> Suspect | None:
+    """Return a joint whose torque was not logged, if the rows allow the test, and others have one.
+
+    Its own rows show it, or those of others, which its zeros spoil: without them, these are predicted better.
+    """
+    missing = len(never_logged(found.logs.fitted))
+    if found.problem.long or found.problem.basis.n == 1 + missing:
+        return None
+    problem, X = found.problem.explicit, found.estimates[found.leading].X
+    if (suspect := silent_joint(problem, X)) is not None:
+        return suspect
+    for j in still_joints(problem):
+        logs = found.logs.without_torque(j)
+        quiet = _shown(found.request, logs, found.request.problem(logs.fitted))
+        before, after = _errors(found, quiet) if quiet.estimates else (0.0, 0.0)
+        if after < SPOILT * before:
+            return unlogged(j)
+    return None
+
+
+def _errors(before: Fit, after: Fit) -> tuple[float, float]:
+    """Return the largest error of the other joints on stretches that were not fitted, with the rows of one and without [%]."""
+    others = np.setdiff1d(np.arange(after.basis.n), never_logged(after.logs.fitted))
+    each = (held_out_errors(one.problem)[others] for one in (before, after))
+    return float(np.max(next(each))), float(np.max(next(each)))
+
+
+def _with_its_cause(found: Fit, error: IdentificationError) -> IdentificationError:
+    """Return why nothing was estimated, with the residuals of least squares, if they depend on the motion."""
+    if isinstance(error, ExcitationError) or found.solver.filtered:
+        return error
+    try:
+        suspects = diagnosed(found.problem, ESTIMATORS.create("GLS").fit(found.problem.explicit).X)
+    except (IdentificationError, np.linalg.LinAlgError):
+        return error
+    causes = [Cause(each, found.robot_model, found.logs.fitted[0]).advice for each in suspects]
+    return IdentificationError(f"{error}; with GLS, {'; '.join(causes)}") if causes else error

@@ -1,0 +1,254 @@
+"""Curves as SVG that stands in a page: panels with axes, lines, dots and intervals, drawn without another package."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from html import escape
+from math import ceil, floor, log10
+from typing import final
+
+import numpy as np
+
+from idbench.identify import Array
+
+WIDTH = 1056.0
+"""Of a figure [px]."""
+
+ROW = 96.0
+"""An inch of a panel's height [px]."""
+
+LEFT = 62.0
+"""Room beside the panels for numbers [px]."""
+
+RIGHT = 8.0
+"""Room at their other end [px]."""
+
+TOP = 24.0
+"""Room for the legend [px]."""
+
+BOTTOM = 34.0
+"""Room below the last panels [px]."""
+
+BETWEEN = 66.0
+"""Room between panels beside each other [px]."""
+
+ABOVE = 30.0
+"""Room between panels above each other [px]."""
+
+FEW = 2
+"""Panels from which on they stand in two columns."""
+
+FINE = 2
+"""Columns of curves for a pixel of a panel, so that a browser can enlarge them: each has its least and its largest sample."""
+
+TICKS = 5
+"""Numbers on an axis, about."""
+
+Scale = Callable[[Array], Array]
+
+
+@final
+@dataclass
+class PanelAxis:
+    """One direction of a panel."""
+
+    log: bool = False
+    """Whether it is logarithmic."""
+    linear: float = 0.0
+    """Size below which a logarithmic axis with both signs is linear; 0: there is none."""
+    limits: tuple[float, float] | None = None
+    """Its ends; those of the data by default."""
+    ticks: dict[float, str] | None = None
+    """Numbers or names on it; round numbers by default."""
+
+    def scaled(self, x: Array) -> Array:
+        """Return where values stand on an even axis."""
+        if self.linear:
+            return np.asarray(np.sign(x) * np.log10(1 + np.abs(x) / self.linear))
+        return np.log10(np.maximum(x, 1e-300)) if self.log else np.asarray(x, dtype=np.float64)
+
+    def ends(self, every: Sequence[Array]) -> tuple[float, float]:
+        """Return its ends, for data."""
+        if self.limits is not None:
+            return self.limits
+        own = [x[np.isfinite(x) & ((x > 0) | (not self.log))] for x in every]
+        values = np.concatenate([*own, np.empty(0)])
+        if not len(values):
+            return (0.1, 1.0) if self.log else (0.0, 1.0)
+        low, high = float(values.min()), float(values.max())
+        room = 0.04 * (high - low) or 0.1 * abs(high) or 1.0
+        return (low, high) if self.log else (low - room, high + room)
+
+    def numbers(self, low: float, high: float) -> dict[float, str]:
+        """Return what stands beside it."""
+        if self.ticks is not None:
+            return {x: text for x, text in self.ticks.items() if low <= x <= high}
+        if self.log:
+            first, last = ceil(log10(low) - 1e-9), floor(log10(high) + 1e-9)
+            every = max(1, ceil((last - first) / TICKS))
+            return {10.0**k: f"{10.0**k:g}" for k in range(first, last + 1, every)}
+        rough = (high - low) / TICKS
+        size = 10.0 ** floor(log10(rough))
+        step = next(size * k for k in (1, 2, 5, 10) if size * k >= rough)
+        return {step * k: f"{step * k:.6g}" for k in range(ceil(low / step), floor(high / step) + 1)}
+
+
+@final
+@dataclass
+class Panel:
+    """A pair of axes, and what is drawn between them."""
+
+    title: str = ""
+    """Above it."""
+    x: PanelAxis = field(default_factory=PanelAxis)
+    """From left to right."""
+    y: PanelAxis = field(default_factory=PanelAxis)
+    """Upwards."""
+    drawn: list[tuple[str, Array, Array, str, float, str]] = field(default_factory=list)
+    """Kind, x, y, color, size and label of what is drawn."""
+
+    def line(self, x: Array, y: Array, color: str, width: float = 1.0, label: str = "", dash: str = "") -> None:
+        """Draw a curve, interrupted where it is NaN."""
+        self.drawn.append(
+            (f"line {dash}", np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64), color, width, label)
+        )
+
+    def dots(self, x: Array, y: Array, color: str, radius: float = 1.5, label: str = "") -> None:
+        """Draw dots."""
+        self.drawn.append(("dots", np.asarray(x, np.float64), np.asarray(y, np.float64), color, radius, label))
+
+    def intervals(self, x: Array, y: Array, half: Array, color: str, label: str = "") -> None:
+        """Draw dots with intervals."""
+        for a, low, high in zip(x, y - half, y + half, strict=True):
+            self.line(np.array([a, a]), np.array([low, high]), color, 1.2)
+        self.dots(x, y, color, 2.2, label)
+
+    def across(self, x: Array, y: Array, color: str, label: str = "") -> None:
+        """Draw short level lines."""
+        for a, b in zip(x, y, strict=True):
+            self.line(np.array([a - 0.35, a + 0.35]), np.array([b, b]), color, 1.2, label)
+            label = ""
+
+
+def figure(panels: Sequence[Panel], height: float, x: str = "", y: str = "", columns: int = 0) -> str:
+    """Return panels as SVG.
+
+    Parameters
+    ----------
+    panels : sequence of Panel
+        In two columns if there are many and no number of columns is given.
+    height : float
+        Of a panel [inch].
+    x, y : str
+        What the axes are.
+    columns : int
+        How many panels stand beside each other.
+    """
+    columns = columns or (2 if len(panels) > FEW else 1)
+    wide = (WIDTH - LEFT - RIGHT - BETWEEN * (columns - 1)) / columns
+    high = height * ROW - ABOVE
+    lines = ceil(len(panels) / columns)
+    upright = any(panel.x.ticks and len(panel.x.ticks) > UPRIGHT for panel in panels)
+    above = ABOVE + (NAMES if upright else 0)
+    bottom = above + BOTTOM - ABOVE
+    whole = TOP + lines * (high + above) + BOTTOM
+    parts = [f'<svg class="curves" xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH:g} {whole:.0f}" font-size="10">']
+    for k, panel in enumerate(panels):
+        at = LEFT + (k % columns) * (wide + BETWEEN), TOP + (k // columns) * (high + above) + ABOVE - 12
+        parts += _panel(panel, at, (wide, high), upright)
+        if k >= len(panels) - columns:
+            parts.append(_text(at[0] + wide / 2, at[1] + high + bottom - 8, x, "middle"))
+        if k % columns == 0 and y:
+            middle = at[1] + high / 2
+            parts.append(_text(at[0] - 50, middle, y, "middle", f' transform="rotate(-90 {at[0] - 50:.0f} {middle:.0f})"'))
+    return "\n".join([*parts, *_legend(panels), "</svg>"])
+
+
+UPRIGHT, NAMES = 18, 30.0
+"""Names of an axis from which on they stand upright, and their room [px]."""
+
+
+def _text(x: float, y: float, text: str, anchor: str = "start", more: str = "") -> str:
+    return f'<text x="{x:.0f}" y="{y:.0f}" text-anchor="{anchor}"{more}>{escape(text)}</text>' if text else ""
+
+
+def _panel(panel: Panel, at: tuple[float, float], size: tuple[float, float], upright: bool) -> Iterator[str]:
+    """Yield the elements of a panel."""
+    (left, top), (wide, high) = at, size
+    low_x, high_x = panel.x.ends([x for _, x, *_ in panel.drawn])
+    low_y, high_y = panel.y.ends([y for _, _, y, *_ in panel.drawn])
+    begin_x, end_x = panel.x.scaled(np.array([low_x, high_x]))
+    begin_y, end_y = panel.y.scaled(np.array([low_y, high_y]))
+
+    def place_x(x: Array) -> Array:
+        return np.asarray(left + wide * (panel.x.scaled(x) - begin_x) / ((end_x - begin_x) or 1.0))
+
+    def place_y(y: Array) -> Array:
+        share = (panel.y.scaled(y) - begin_y) / ((end_y - begin_y) or 1.0)
+        return np.clip(top + high * (1 - share), top - high, top + 2 * high)
+
+    box = f'width="{wide:.0f}" height="{high:.0f}"'
+    yield f'<svg x="{left:.0f}" y="{top:.0f}" {box} viewBox="{left:.0f} {top:.0f} {wide:.0f} {high:.0f}">'
+    for value in panel.y.numbers(low_y, high_y):
+        level = float(place_y(np.array([value]))[0])
+        yield f'<path d="M{left:.0f},{level:.1f}h{wide:.0f}" stroke="#e4e4e4"/>'
+    for kind, x, y, color, width, _ in panel.drawn:
+        yield from _drawn(kind, place_x(x), place_y(y), color, width, int(wide) * FINE)
+    yield "</svg>"
+    yield f'<rect x="{left:.0f}" y="{top:.0f}" {box} fill="none" stroke="#888"/>'
+    yield _text(left, top - 5, panel.title)
+    for value, text in panel.y.numbers(low_y, high_y).items():
+        yield _text(left - 4, float(place_y(np.array([value]))[0]) + 3, text, "end")
+    below = top + high + (5 if upright else 13)
+    for value, text in panel.x.numbers(low_x, high_x).items():
+        across = float(place_x(np.array([value]))[0]) + (3 if upright else 0)
+        turned = f' transform="rotate(-90 {across:.0f} {below:.0f})"' if upright else ""
+        yield _text(across, below, text, "end" if upright else "middle", turned)
+
+
+def _drawn(kind: str, x: Array, y: Array, color: str, width: float, columns: int) -> Iterator[str]:
+    """Yield the elements of what is drawn, at places [px]."""
+    there = np.isfinite(x) & np.isfinite(y)
+    if kind == "dots":
+        if len(x) > columns:  # more dots than that are a cloud, whatever they are
+            every = len(x) // columns + 1
+            x, y = x[::every], y[::every]
+            there = there[::every]
+        points = "".join(f"M{a:.1f},{b:.1f}h0" for a, b in zip(x[there].tolist(), y[there].tolist(), strict=True))
+        yield f'<path d="{points}" stroke="{color}" stroke-width="{2 * width:g}" stroke-linecap="round"/>' if points else ""
+        return
+    x, y = _thinned(x, y, columns)
+    there = np.isfinite(x) & np.isfinite(y)
+    breaks = np.flatnonzero(np.diff(there.astype(int)) != 0) + 1
+    path = ""
+    for a, b, own in zip(np.split(x, breaks), np.split(y, breaks), np.split(there, breaks), strict=True):
+        if own.any():
+            path += "M" + " ".join(f"{p:.1f},{q:.1f}" for p, q in zip(a.tolist(), b.tolist(), strict=True))
+    dash = kind.removeprefix("line ").strip()
+    dashed = f' stroke-dasharray="{dash}"' if dash else ""
+    yield f'<path d="{path}" fill="none" stroke="{color}" stroke-width="{width:g}"{dashed}/>' if path else ""
+
+
+def _thinned(x: Array, y: Array, columns: int) -> tuple[Array, Array]:
+    """Return a curve with the least and the largest value of each column, in their order."""
+    every = len(x) // columns
+    if every < 3:
+        return x, y
+    count = len(x) // every
+    shaped = y[: count * every].reshape(count, every)
+    gone = ~np.isfinite(shaped)
+    low, high = np.where(gone, np.inf, shaped).argmin(axis=1), np.where(gone, -np.inf, shaped).argmax(axis=1)
+    places = np.stack([low, high], axis=1) + every * np.arange(count)[:, None]
+    kept = np.unique(places.ravel())
+    return x[kept], y[kept]
+
+
+def _legend(panels: Sequence[Panel]) -> Iterator[str]:
+    """Yield the labels of the first panel, from the right."""
+    at = WIDTH - RIGHT
+    for kind, _, _, color, _, label in reversed([drawn for drawn in panels[0].drawn if drawn[-1]] if panels else []):
+        at -= 6.0 * len(label) + 8
+        yield _text(at, 11, label)
+        at -= 20
+        shape, width = ("h0", 5) if kind == "dots" else ("h14", 2)
+        yield f'<path d="M{at:.0f},8{shape}" stroke="{color}" stroke-width="{width}" stroke-linecap="round"/>'
+        at -= 10

@@ -1,0 +1,186 @@
+"""Robots for simulators and for training: read by their own parsers, and by frameworks' interfaces."""
+
+import json
+import subprocess
+import sys
+import tomllib
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+import pytest
+import yaml
+
+import idbench
+from idbench.experiments.exports import ranges
+from idbench.experiments.exports.ensemble import Ensemble
+from idbench.experiments.exports.exports import EXPORTS
+from idbench.experiments.identification.consistent_estimate import drawn_about
+from idbench.identify.parameters.bodies import exist
+from idbench.sim.engine.run import ideal_log
+from idbench.sim.errors import RobotError
+from idbench.sim.robot.inverse_dynamics import inverse_dynamics
+from idbench.sim.robot.mounting import PLAIN
+from idbench.sim.robot.robot import Robot
+from idbench.sim.robot.tree import kinematic_tree, standard_parameters
+from idbench.sim.robot.write_sdf import sdf_text
+from idbench.sim.robot.write_urdf import urdf_text
+from idbench.sim.trajectories import RandomMoves
+
+DRAKE = """
+import sys, numpy as np
+from pydrake.all import MultibodyForces, MultibodyPlant, Parser
+path, motion = sys.argv[1], np.load("motion.npz")
+plant = MultibodyPlant(0.0)
+Parser(plant).AddModels(path)
+if path.endswith("urdf"):
+    plant.WeldFrames(plant.world_frame(), plant.GetFrameByName("base"))
+plant.mutable_gravity_field().set_gravity_vector(motion["gravity"])
+plant.Finalize()
+order = [plant.GetJointByName(str(name)).velocity_start() for name in motion["joints"]]
+context, tau = plant.CreateDefaultContext(), []
+for each in zip(motion["q"], motion["qd"], motion["qdd"]):
+    q, qd, qdd = np.zeros((3, plant.num_velocities()))
+    for whole, own in zip((q, qd, qdd), each):
+        whole[order] = own
+    plant.SetPositions(context, q)
+    plant.SetVelocities(context, qd)
+    forces = MultibodyForces(plant)
+    plant.CalcForceElementsContribution(context, forces)
+    tau.append(plant.CalcInverseDynamics(context, qdd, forces)[order])
+np.save("tau.npy", tau)
+"""
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("ending", ["sdf", "urdf"])
+@pytest.mark.parametrize("name", ["scara", "puma560", "panda", "servo_arm"])
+def test_drake_reads_links_rotors_and_damping(name, ending, tmp_path, rng):
+    """Its torques are those of MuJoCo's inverse dynamics, which have no Coulomb friction either."""
+    robot = Robot.load(name)
+    tree, standard = kinematic_tree(robot), standard_parameters(robot)
+    text = sdf_text(robot, tree, standard) if ending == "sdf" else urdf_text(name, robot, tree, standard, PLAIN)
+    (tmp_path / f"arm.{ending}").write_text(text)
+    q, qd, qdd = rng.normal(size=(3, 10, robot.n))
+    np.savez(tmp_path / "motion.npz", q=q, qd=qd, qdd=qdd, gravity=tree.gravity, joints=robot.joints)
+    command = [sys.executable, "-c", DRAKE, f"arm.{ending}"]
+    subprocess.run(command, cwd=tmp_path, check=True, capture_output=True)
+    tau = inverse_dynamics(robot, q, qd, qdd)
+    np.testing.assert_allclose(np.load(tmp_path / "tau.npy"), tau, atol=1e-12 * np.abs(tau).max())
+
+
+@pytest.mark.parametrize("name", ["scara", "puma560", "panda"])
+def test_a_urdf_keeps_its_rotors(name, tmp_path, rng):
+    robot = Robot.load(name)
+    tree, standard = kinematic_tree(robot), standard_parameters(robot)
+    (tmp_path / "arm.urdf").write_text(urdf_text(name, robot, tree, standard, PLAIN))
+    back = Robot.load(str(tmp_path / "arm.urdf"))
+    np.testing.assert_allclose(back.model.dof_armature, robot.model.dof_armature)
+    q, qd, qdd = rng.normal(size=(3, 10, robot.n))
+    tau = inverse_dynamics(robot, q, qd, qdd)
+    np.testing.assert_allclose(inverse_dynamics(back, q, qd, qdd), tau, atol=1e-5 * np.abs(tau).max())  # angles of a URDF
+    again = urdf_text(str(tmp_path / "arm.urdf"), back, kinematic_tree(back), standard_parameters(back), PLAIN)
+    assert again.count("drake:rotor_inertia") == np.count_nonzero(robot.model.dof_armature)
+
+
+def test_all_files_beside_ranges_are_asked_for_before_the_work():
+    assert EXPORTS[".toml"].beside == (*ranges.CODE, ranges.PICTURE)
+
+
+def test_a_gear_ratio_counts_twice(tmp_path):
+    text = urdf_text("scara", robot := Robot.load("scara"), kinematic_tree(robot), standard_parameters(robot), PLAIN)
+    (tmp_path / "arm.urdf").write_text(text.replace('gear_ratio value="1.0"', 'gear_ratio value="10"'))
+    np.testing.assert_allclose(Robot.load(str(tmp_path / "arm.urdf")).model.dof_armature, 100 * robot.model.dof_armature)
+
+
+def noisy_log(name, seed):
+    """Return the log of an ideal robot with 1 % of noise in its torques, and an encoder of 16 bits."""
+    robot, rng = Robot.load(name), np.random.default_rng(seed)
+    moves = RandomMoves(moves=10, durations=(0.8, 1.2), velocity=(2.0,), rest=0.2, seed=seed)
+    log = ideal_log(robot, moves.sample(robot, 200.0))
+    count = 2 * np.pi / 2**16
+    noise = 0.01 * log.tau.std(axis=0) * rng.standard_normal(log.tau.shape)
+    return replace(log, q=count * np.round(log.q / count), tau=log.tau + noise)
+
+
+@pytest.fixture(scope="module")
+def found():
+    """The SCARA as it was identified, with a held-out log."""
+    logs = [noisy_log("scara", seed) for seed in (1, 2)]
+    return idbench.fit(logs[0], "scara", validate=logs[1], model="explicit")
+
+
+def test_drawn_robots_exist_and_scatter_as_the_estimate(found, rng):
+    estimate, robot_model = found.fit.estimates["explicit"], found.fit.robot_model
+    sigma = estimate.standard_errors
+    deviations = rng.multivariate_normal(np.zeros(len(sigma)), estimate.covariance, 300)
+    drawn = drawn_about(robot_model, estimate, deviations)
+    assert all(exist(robot_model.grouping.standard.parameters, own) for own in drawn)
+    base = np.array([robot_model.grouping.base(own) for own in drawn])
+    np.testing.assert_allclose(base.std(axis=0), sigma, rtol=0.25)  # 300 draws, and none moved that exists
+    np.testing.assert_allclose(base.mean(axis=0), estimate.X, atol=4 * sigma.max())
+
+
+@pytest.mark.thorough
+def test_ranges_and_robots_are_written_and_judged(found, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    notes = found.write("ranges.toml", "robots.ensemble")
+    assert "free runs of 0.5 s" in notes[1]
+    table = tomllib.loads((tmp_path / "ranges.toml").read_text())
+    robots = sorted((tmp_path / "robots.ensemble").glob("*.xml"))
+    assert len(robots) == 200
+    damping = [mujoco.MjModel.from_xml_path(str(path)).dof_damping[0] for path in robots]
+    told = table["joints"]["joint1"]["damping"]
+    np.testing.assert_allclose([np.mean(damping), np.std(damping)], [told["mean"], told["sigma"]], rtol=1e-4)
+    assert told["low"] < told["mean"] < told["high"]
+    assert told["low"] < 0.05 < told["high"]
+    (band,) = table["bands"]
+    assert min(band["held"].values()) > 0.9  # of 95 %, over some 20 runs of a tenth of a second to its end
+    matrix = np.array(table["correlations"]["matrix"])
+    assert matrix.shape == 2 * (len(table["correlations"]["of"]),)
+    for name in ("mjlab", "isaaclab", "playground"):
+        compile((tmp_path / f"ranges_{name}.py").read_text(), name, "exec")
+    with pytest.raises(idbench.experiments.results.writing.ResultsError, match="--force"):
+        found.write("robots.ensemble")
+
+
+@pytest.mark.thorough
+def test_a_band_that_is_too_narrow_says_so(found):
+    ensemble = Ensemble(found.fit, "explicit")
+    ensemble.__dict__["calibrated"] = 1e-3
+    (band,) = ensemble.bands
+    assert "lacks something" in band.words(("joint1", "joint2"))
+
+
+def test_actuators_are_the_robots(found, tmp_path):
+    made = EXPORTS[".yaml"].render(found.fit, "explicit", tmp_path / "arm.yaml")
+    table = yaml.safe_load(made.texts[tmp_path / "arm.yaml"])
+    joint = table["joints"]["joint2"]
+    np.testing.assert_allclose(joint["damping"], 0.01, atol=4 * joint["damping_sigma"])
+    assert json.dumps(table)
+
+
+def test_what_a_reader_leaves_out_is_named_with_its_size():
+    fit = idbench.fit(noisy_log("puma560", 1), "puma560", model="explicit").fit
+    warnings = " ".join(EXPORTS[".sdf"].render(fit, "explicit", None).warnings)
+    assert "rotors are left out by Gazebo" in warnings
+    assert "Drake has no Coulomb friction" in warnings
+    assert "%" in warnings
+
+
+def test_what_is_not_asked_for_is_not_in_drawn_robots():
+    """The file's Coulomb friction would count beside the viscous one that was identified in its place."""
+    fit = idbench.fit(noisy_log("puma560", 1), "puma560", model="explicit", friction=("viscous",), armature="none").fit
+    drawn = Ensemble(fit, "explicit")._drawn(2, 1.0, np.random.default_rng(0))
+    for j in range(6):
+        assert not drawn[f"Fs{j + 1}"].any()
+        assert not drawn[f"Ia{j + 1}"].any()
+
+
+def test_a_transmission_of_others_is_no_rotor(tmp_path):
+    text = urdf_text("scara", robot := Robot.load("scara"), kinematic_tree(robot), standard_parameters(robot), PLAIN)
+    (tmp_path / "arm.urdf").write_text(text.replace("<drake:gear", '<param value="abs12"/><drake:gear'))
+    np.testing.assert_allclose(Robot.load(str(tmp_path / "arm.urdf")).model.dof_armature, robot.model.dof_armature)
+    (tmp_path / "arm.urdf").write_text(text.replace('gear_ratio value="1.0"', 'gear_ratio value="one"'))
+    with pytest.raises(RobotError, match="gear_ratio has the value 'one'"):
+        Robot.load(str(tmp_path / "arm.urdf"))

@@ -1,0 +1,82 @@
+"""What an integrator makes of a step, taken out of the torques that MuJoCo's own actuators made."""
+
+import mujoco
+import numpy as np
+import pytest
+
+from idbench.sim.robot.inverse_dynamics import coulomb_torque, inverse_dynamics
+from idbench.sim.robot.robot import Robot
+from idbench.sim.robot.time_steps import actuator_damping, seeming_inertia, torque_of_steps
+
+H = 0.002
+
+ARM = """<mujoco><option timestep="0.002" integrator="{}"><flag {}/></option>
+<default><joint damping="0.7" armature="0.02" frictionloss="0"/></default><worldbody>
+<body><joint name="a" axis="0 1 0"/><inertial pos="0 0 .2" mass="2" diaginertia=".05 .04 .02"/>
+<body pos="0 0 .4"><joint name="b" axis="1 0 0"/><inertial pos=".05 0 .15" mass="1" diaginertia=".02 .02 .01"/></body></body>
+</worldbody><actuator><position joint="a" kp="100" kv="6"/><position joint="b" kp="20" kv="1" gear="2"/></actuator></mujoco>"""
+
+
+def simulated(path):
+    """Return positions and torques of a plain simulation, logged before each step."""
+    model = mujoco.MjModel.from_xml_path(path)
+    data, q, tau = mujoco.MjData(model), [], []
+    for k in range(3000):
+        data.ctrl = np.sin(np.array([2.1, 3.3]) * k * H) * (1 - np.exp(-3 * k * H))
+        mujoco.mj_forward(model, data)
+        q.append(data.qpos.copy())
+        tau.append(data.qfrc_actuator.copy())
+        mujoco.mj_step(model, data)
+    return np.array(q), np.array(tau)
+
+
+def slope(x):
+    """Return the derivative by fourth-order differences at one step."""
+    return (np.roll(x, 2, axis=0) - 8 * np.roll(x, 1, axis=0) + 8 * np.roll(x, -1, axis=0) - np.roll(x, -2, axis=0)) / (12 * H)
+
+
+@pytest.mark.parametrize(
+    ("integrator", "flag", "left"),
+    [
+        ("implicitfast", "", 1e-4),
+        ("Euler", "", 1e-4),
+        ("Euler", 'eulerdamp="disable"', 1e-4),
+        ("implicit", "", 3e-3),  # its Coriolis torques are linearized about the beginning of the step
+    ],
+)
+def test_torques_of_every_integrator_become_those_of_the_motion(tmp_path, integrator, flag, left):
+    """Inverse dynamics of the positions, by MuJoCo, is another route than its step; errors are over what is corrected."""
+    path = tmp_path / "arm.xml"
+    path.write_text(ARM.format(integrator, flag))
+    q, tau = simulated(str(path))
+    motion = [q]
+    for _ in range(4):
+        motion.append(slope(motion[-1]))
+    robot, inner = Robot.load(str(path)), slice(500, -20)
+    expected = inverse_dynamics(robot, *motion[:3]) + coulomb_torque(robot, motion[1])
+    extra = torque_of_steps(robot, motion)
+    off = np.sqrt(np.mean(((tau - extra) - expected)[inner] ** 2, axis=0) / np.mean(tau[inner] ** 2, axis=0))
+    assert (off < left).all()
+    before = np.sqrt(np.mean((tau - expected)[inner] ** 2, axis=0) / np.mean(tau[inner] ** 2, axis=0))
+    assert (before > 10 * off).all()
+
+
+def test_what_seems_inertia_is_that_of_the_damping_at_the_end_of_a_step(tmp_path):
+    path = tmp_path / "arm.xml"
+    sizes = {}
+    for integrator, flag in (
+        ("implicitfast", ""),
+        ("implicit", ""),
+        ("Euler", ""),
+        ("Euler", 'eulerdamp="disable"'),
+        ("RK4", ""),
+    ):
+        path.write_text(ARM.format(integrator, flag))
+        sizes[integrator + flag] = seeming_inertia(Robot.load(str(path)))
+    kv, half = np.array([6.0, 4.0]), 0.35
+    np.testing.assert_allclose(actuator_damping(Robot.load(str(path))), kv)
+    np.testing.assert_allclose(sizes["implicitfast"], H * (kv + half))
+    np.testing.assert_allclose(sizes["implicit"], H * (kv + half))
+    np.testing.assert_allclose(sizes["Euler"], [H * half] * 2)
+    np.testing.assert_allclose(sizes['Eulereulerdamp="disable"'], [-H * half] * 2)
+    assert not sizes["RK4"].any()
