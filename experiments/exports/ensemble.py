@@ -143,7 +143,7 @@ class Ensemble:
             n = residual.shape[-1]
             power = np.abs(np.fft.rfft(centred, 2 * n)) ** 2
             correlation = np.fft.irfft(power)[:, :n]
-            below = correlation < correlation[:, :1] / np.e
+            below = correlation < correlation[:, :1] * np.exp(-1.0)
             times.append(step * np.where(below.any(axis=-1), below.argmax(axis=-1), n))
         return self.spread * np.sqrt(np.mean(sizes, axis=0)), np.mean(times, axis=0)
 
