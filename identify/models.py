@@ -1,17 +1,23 @@
 """Identification models, and their table."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from math import ceil
 from typing import ClassVar, final
 
 import numpy as np
 
-from idbench.identify.arrays import HELD, Array, Columns, Multipliers, combined
+from idbench.identify.arrays import Array, Columns, Multipliers, combined
 from idbench.identify.basis.basis import Basis
 from idbench.identify.blame import expect
 from idbench.identify.plugins import Table
 from idbench.identify.signals.signals import Signals, State
+
+
+STRETCH = 4096
+"""Samples whose columns are made at once where they are only summed: those of six joints then take 6 MB."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,12 +28,27 @@ class Equations:
     """The log's."""
     B: Multipliers
     """(row of an instant, joint) -> what the row multiplies the torque of the joint by."""
-    c: Columns
-    """(row, place in X) -> column that is used as it is, shape (..., time)."""
-    e: Columns
-    """(row, place in X) -> column that is still to be differentiated, shape (..., time)."""
+    columns_of: Callable[[State], tuple[Columns, Columns]]
+    """Motion -> c and e: (row, place in X) -> column, shape (..., time), used as it is, and still to be differentiated."""
     names: tuple[str, ...]
     """Names of the parameters X."""
+
+    def columns(self, samples: slice) -> tuple[Columns, Columns]:
+        """Return c and e at some samples, averaged over the same windows as the torque (at the ends as if motion stopped)."""
+        c, e = self.columns_of(self.signals.state.part(samples))
+        average = self.signals.torque.average
+        return {at: average(column) for at, column in c.items()}, {at: average(column) for at, column in e.items()}
+
+    @cached_property
+    def differentiates(self) -> bool:
+        """Whether there is an e."""
+        return bool(self.columns(slice(0, 2))[1])
+
+    @cached_property
+    def reach(self) -> int:
+        """Samples to either side that s and the windows of the columns look at."""
+        fs = self.signals.fs
+        return ceil((self.signals.differentiator.halo(fs) + self.signals.torque.halo()) * fs - 1e-9)
 
     @property
     def kinds(self) -> int:
@@ -58,22 +79,18 @@ class Equations:
                 weight[..., row, :] = 0.0
         return weight
 
-    @cached_property
-    def addresses(self) -> tuple[tuple[int, int], ...]:
-        """(row, place in X) of every column of c + s e that is not zero at all times; k of them, those that are held first."""
-        return tuple(sorted(dict.fromkeys((*self.c, *self.e)), key=lambda address: address[1] != HELD))
-
-    @cached_property
-    def rates(self) -> Columns:
-        """The columns s e."""
-        if not self.e:
-            return {}
-        rates = self.signals.s(np.stack(list(self.e.values()), axis=-2))
-        return {address: rates[..., i, :] for i, address in enumerate(self.e)}
-
     def predicted(self, X: Array) -> Array:
         """Return (c + s e) X at every sample, shape (..., row, time), for parameters of shape (..., p)."""
-        return combined(self.rates, X, combined(self.c, X, np.zeros(self.y.shape)))
+        shape = self.y.shape
+        plain, late = np.zeros((2, *np.broadcast_shapes(shape, (*X.shape[:-1], 1, 1))))
+        for begin in range(0, shape[-1], STRETCH):
+            inner = slice(begin, begin + STRETCH)
+            seen = slice(max(0, begin - self.reach), begin + STRETCH + self.reach)
+            own = slice(begin - seen.start, begin - seen.start + STRETCH)
+            for total, columns in zip((plain, late), self.columns(seen), strict=True):
+                there = combined(columns, X, np.zeros_like(total[..., seen]))
+                total[..., inner] = there[..., own]
+        return plain + self.signals.s(late)
 
 
 def torque_rows(B: Multipliers, signals: Signals) -> Array:
@@ -105,17 +122,11 @@ class AbstractModel(ABC):
 
     @final
     def equations(self, basis: Basis, signals: Signals) -> Equations:
-        """Return the model's equations at every sample, their columns averaged over the same windows as the torque."""
-        state, average = signals.state, signals.torque.average
+        """Return the model's equations at every sample."""
+        state = signals.state
         shape = (*state.q.shape[:-2], state.q.shape[-1])
         B = {at: float(x) if np.ndim(x) == 0 else expect(self, "B", x, shape) for at, x in self.B(state).items()}
-        return Equations(
-            signals,
-            B,
-            {address: average(column) for address, column in self.c(basis, state).items()},
-            {address: average(column) for address, column in self.e(basis, state).items()},
-            basis.names,
-        )
+        return Equations(signals, B, lambda motion: (self.c(basis, motion), self.e(basis, motion)), basis.names)
 
 
 def rows_per_sample(model: AbstractModel, n: int) -> int:

@@ -62,6 +62,30 @@ class Symbol:
     def __init__(self, tape: "Tape", number: int) -> None:
         self.tape, self.number = tape, number
 
+    def __add__(self, other: "Value") -> "Value":
+        return self.tape.apply("+", self, other)
+
+    def __radd__(self, other: float) -> "Value":
+        return self.tape.apply("+", other, self)
+
+    def __sub__(self, other: "Value") -> "Value":
+        return self.tape.apply("-", self, other)
+
+    def __rsub__(self, other: float) -> "Value":
+        return self.tape.apply("-", other, self)
+
+    def __mul__(self, other: "Value") -> "Value":
+        return self.tape.apply("*", self, other)
+
+    def __rmul__(self, other: float) -> "Value":
+        return self.tape.apply("*", other, self)
+
+    def __neg__(self) -> "Value":
+        return self.tape.apply("negate", self)
+
+    def __array_ufunc__(self, function: Any, method: str, *of: "Value") -> "Value":
+        return self.tape.apply(OPERATIONS[function], *of) if method == "__call__" else NotImplemented
+
 
 Value: TypeAlias = Symbol | float
 """One value."""

@@ -1,9 +1,9 @@
 """The links of any tree of hinges and slides."""
 
-from collections.abc import Callable, Iterator, Set
+from collections.abc import Callable, Iterator, Mapping, Set
 from dataclasses import dataclass, replace
-from functools import cache
-from typing import NamedTuple, Self, TypeAlias, final
+from functools import cache, lru_cache
+from typing import Any, NamedTuple, Self, TypeAlias, final
 
 import numpy as np
 
@@ -13,7 +13,9 @@ from idbench.identify.basis.friction.laws import CoulombFriction, ViscousFrictio
 from idbench.identify.basis.friction.load import TiedFriction
 from idbench.identify.basis.joint_law import AbstractFriction, Armature
 from idbench.identify.basis.of_joints import Coupled, OfJoints
+from idbench.identify.basis.replay import Replay, recorded_motion
 from idbench.identify.basis.springs import Spring
+from idbench.identify.basis.tape import Tape
 from idbench.identify.basis.twists import (
     ZERO,
     Matrix,
@@ -120,9 +122,6 @@ def energy(V: Twist, up: Vector, height: Term) -> tuple[Term, ...]:
     return (*squares, *add(cross(v, w), up), plus(times(0.5, dot(v, v)), height))
 
 
-Pairs: TypeAlias = tuple[tuple[int, int], ...]
-
-
 @final
 @dataclass(frozen=True)
 class TreeLinks(AbstractConservativeBlock):
@@ -151,55 +150,86 @@ class TreeLinks(AbstractConservativeBlock):
 
     def explicit(self, state: State) -> BlockColumns:
         """Return D (Eq. 5, 6)."""
-        at = state.shared(self.tree, self._twists)
-        force = {j: Wrench.inertial(at.velocity[j], at.acceleration[j], at.up[j]) for j in self._massive}
-        return self._columns(state, self._pairs, lambda i, j, x: force[j].along(at.unit[j][i], x))
+        return self._columns("explicit", state)
 
     def momentum(self, state: State) -> BlockColumns:
         """Return M_i(q) qd (Eq. 9)."""
-        at = state.shared(self.tree, self._twists)
-        momentum = {j: Wrench.momentum(at.velocity[j]) for j in self._massive}
-        return self._columns(state, self._pairs, lambda i, j, x: momentum[j].along(at.unit[j][i], x))
+        return self._columns("momentum", state)
 
     def remainder(self, state: State) -> BlockColumns:
         """Return R_i(q, qd) = -dT_i/dq + dU_i/dq (Eq. 8, 9)."""
-        at = state.shared(self.tree, self._twists)
-        momentum = {j: Wrench.momentum(at.velocity[j]) for j in self._massive}
-        weight = {j: Wrench.weight(at.up[j]) for j in self._massive}
-
-        def column(i: int, j: int, x: int) -> Term:
-            return minus(weight[j].along(at.unit[j][i], x), momentum[j].along(at.slope[j][i], x))
-
-        return self._columns(state, self._pairs, column)
+        return self._columns("remainder", state)
 
     def energy(self, state: State) -> BlockColumns:
         """Return h_i(q, qd) (Eq. 10)."""
-        at = state.shared(self.tree, self._twists)
-        stored = {j: energy(at.velocity[j], at.up[j], at.height[j]) for j in self._massive}
-        return self._columns(state, tuple((0, j) for j in self._massive), lambda _, j, x: stored[j][x])
-
-    def _twists(self, state: State) -> Twists:
-        return Twists(self.tree, state)
+        return self._columns("energy", state)
 
     @property
     def _massive(self) -> tuple[int, ...]:
-        return tuple(j for j, joint in enumerate(self.tree.joints) if joint.massive)
+        return _massive(self.tree)
 
-    @property
-    def _pairs(self) -> Pairs:
-        """(joint, link that it moves)."""
-        return tuple((i, j) for j in self._massive for i in self.tree.ancestors(j))
+    def _columns(self, function: str, state: State) -> BlockColumns:
+        """Return the columns that are asked for and not zero at all times."""
+        if isinstance(state.q, np.ndarray):
+            return _replay(self.tree, self.only, function).of(state)
+        return _asked(_formulas(self.tree, function, state), self.only)
 
-    def _columns(
-        self, state: State, rows: tuple[tuple[int, int], ...], column: Callable[[int, int, int], Term]
-    ) -> BlockColumns:
-        """Return the columns of (row, link) that are asked for and not zero at all times."""
-        shape, found = state.q[..., 0, :].shape, {}
-        for i, j in rows:
-            for x, parameter in enumerate(parameters_of_link(j)):
-                if (self.only is None or parameter in self.only) and not is_zero(term := column(i, j, x)):
-                    found[i, parameter] = np.broadcast_to(term, shape)
-        return found
+
+def _massive(tree: KinematicTree) -> tuple[int, ...]:
+    return tuple(j for j, joint in enumerate(tree.joints) if joint.massive)
+
+
+def _asked(columns: Mapping[tuple[int, Parameter], Term], only: frozenset[Parameter] | None) -> dict[tuple[int, Parameter], Any]:
+    return {key: x for key, x in columns.items() if (only is None or key[1] in only) and not is_zero(x)}
+
+
+@lru_cache(maxsize=64)
+def _replay(tree: KinematicTree, only: frozenset[Parameter] | None, function: str) -> Replay[tuple[int, Parameter]]:
+    tape, columns = _recorded(tree, function)
+    return Replay(tape, _asked(columns, only))
+
+
+@lru_cache(maxsize=32)
+def _recorded(tree: KinematicTree, function: str) -> tuple[Tape, Mapping[tuple[int, Parameter], Term]]:
+    tape = Tape()
+    return tape, _formulas(tree, function, recorded_motion(tape))
+
+
+def _formulas(tree: KinematicTree, function: str, state: State) -> dict[tuple[int, Parameter], Term]:
+    """Return the columns of (row, parameter): what each parameter of a link adds along the motion that joint i gives it."""
+    at, massive = Twists(tree, state), _massive(tree)
+    if function == "energy":
+        stored = {j: energy(at.velocity[j], at.up[j], at.height[j]) for j in massive}
+        return {(0, p): x for j in massive for p, x in zip(parameters_of_link(j), stored[j], strict=True)}
+    column = _COLUMN_OF[function](at, massive)
+    return {(i, p): column(i, j, x) for j in massive for i in tree.ancestors(j) for x, p in enumerate(parameters_of_link(j))}
+
+
+Column: TypeAlias = Callable[[int, int, int], Term]
+"""(joint, link that it moves, parameter) -> its column."""
+
+
+def _explicit(at: Twists, massive: tuple[int, ...]) -> Column:
+    force = {j: Wrench.inertial(at.velocity[j], at.acceleration[j], at.up[j]) for j in massive}
+    return lambda i, j, x: force[j].along(at.unit[j][i], x)
+
+
+def _momentum(at: Twists, massive: tuple[int, ...]) -> Column:
+    momentum = {j: Wrench.momentum(at.velocity[j]) for j in massive}
+    return lambda i, j, x: momentum[j].along(at.unit[j][i], x)
+
+
+def _remainder(at: Twists, massive: tuple[int, ...]) -> Column:
+    momentum = {j: Wrench.momentum(at.velocity[j]) for j in massive}
+    weight = {j: Wrench.weight(at.up[j]) for j in massive}
+    return lambda i, j, x: minus(weight[j].along(at.unit[j][i], x), momentum[j].along(at.slope[j][i], x))
+
+
+_COLUMN_OF: dict[str, Callable[[Twists, tuple[int, ...]], Column]] = {
+    "explicit": _explicit,
+    "momentum": _momentum,
+    "remainder": _remainder,
+}
 
 
 @cache

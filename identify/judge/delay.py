@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy
 
 from idbench.identify.arrays import Array
 from idbench.identify.basis.basis import Basis
@@ -12,6 +11,7 @@ from idbench.identify.data.motion_log import MotionLog, TorqueChannel
 from idbench.identify.errors import LogError, RangeError, SettingError
 from idbench.identify.estimators.log_rows import DELAY_STEP
 from idbench.identify.estimators.problem import Problem
+from idbench.identify.minimum import minimum
 from idbench.identify.models import ExplicitModel
 from idbench.identify.rows.chain import Chain, idbench_chain
 from idbench.identify.rows.rows import Rows, manageable
@@ -189,10 +189,8 @@ class _Search:
                 f"the torque fits best at an end of the range, {grid[best]:g} s: look further, or give the delay; "
                 "a chain that takes torques as logged does not read it at all"
             )
-        found = scipy.optimize.minimize_scalar(
-            self._misfit, bounds=(grid[best - 1], grid[best + 1]), method="bounded", options={"xatol": 1e-7}
-        )
-        return self._refined(float(found.x), (float(grid[best - 1]), float(grid[best + 1])))
+        low, high = float(grid[best - 1]), float(grid[best + 1])
+        return self._refined(minimum(self._misfit, low, high, 1e-7), (low, high))
 
     def _refined(self, delay: float, within: tuple[float, float]) -> DelayEstimate:
         """Return the delay as a parameter, delta(k+1) = delta(k) + its GLS step, and its jackknife's standard deviation.

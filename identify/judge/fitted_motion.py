@@ -8,10 +8,11 @@ from typing import final
 import numpy as np
 import scipy
 
-from idbench.identify.arrays import TINY, Array, combined
+from idbench.identify.arrays import TINY, Array
 from idbench.identify.basis.basis import Basis
 from idbench.identify.basis.block import RIGID
 from idbench.identify.basis.friction.laws import Cogging
+from idbench.identify.basis.newton_euler import torques
 from idbench.identify.basis.of_joints import OfJoints
 from idbench.identify.basis.tree_links import TreeLinks
 from idbench.identify.data.kinematics import KinematicTree
@@ -129,7 +130,7 @@ class FittedMotion:
         """Return the torque of a state, of which the motion may be a part that is repeated."""
         times = state.q.shape[-1] // len(self.t)
         conditions = {name: np.tile(x, times) for name, x in self.state.conditions.items()}
-        return combined(basis.explicit(replace(state, conditions=conditions)), X, np.zeros(state.q.shape))
+        return torques(basis, replace(state, conditions=conditions), X)
 
 
 def tree_of(basis: Basis) -> KinematicTree | None:

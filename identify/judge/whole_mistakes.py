@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
-import scipy
 
 from idbench.identify.arrays import Array
 from idbench.identify.basis.basis import Basis
@@ -13,6 +12,7 @@ from idbench.identify.estimators.problem import Problem
 from idbench.identify.judge.fitted_motion import carrying, on_tree, tree_of
 from idbench.identify.judge.stretches import held_out_errors
 from idbench.identify.judge.suspect import Suspect
+from idbench.identify.minimum import minimum
 from idbench.identify.rows.factors import CONVERGED
 
 POOR = 5.0
@@ -128,8 +128,8 @@ def _rates(problem: Problem) -> Iterator[_Tried]:
     if unlikely(RATES[best]) > problem.factors.misfit() - DECISIVE:
         return
     low, high = RATES[best] * (1 - RATE_STEP), RATES[best] * (1 + RATE_STEP)
-    found = scipy.optimize.minimize_scalar(unlikely, bounds=(low, high), method="bounded", options={"xatol": RATE_STEP / 50})
-    yield _Tried("rate", "clock", None, (float(found.x) - 1,), at(float(found.x)))
+    found = minimum(unlikely, low, high, RATE_STEP / 50)
+    yield _Tried("rate", "clock", None, (found - 1,), at(found))
 
 
 def _exchanged(problem: Problem) -> Iterator[_Tried]:

@@ -1,5 +1,6 @@
 """The linear map from samples to rows."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from math import ceil
 from typing import Protocol, Self
@@ -98,6 +99,10 @@ class Window(Protocol):
         """Return the sums of `x`, shape (..., time), shape (..., count)."""
 
 
+OVERLAP = 4
+"""Least length of a stretch, over what is looked at beside it."""
+
+
 @dataclass(frozen=True, eq=False)
 class RowMap:
     """The rows of one log as a linear function K of signals c and e (..., kind of row, time):
@@ -146,6 +151,38 @@ class RowMap:
         if (self.inside == 1).all() and (self.outside == 1).all():
             return self
         return replace(self, inside=np.ones_like(self.inside), outside=np.ones_like(self.outside))
+
+    def stretches(self, samples: int, reach: int) -> Iterator[tuple[Self, slice, slice]]:
+        """Yield the map of some rows after the other, with the samples that it takes and the places of its rows.
+
+        A recursive filter looks at all samples, and stays whole.
+
+        Parameters
+        ----------
+        samples : int
+            Samples of a stretch; those that rows look at come on top of them.
+        reach : int
+            Samples to either side that are needed beyond those of the kernel.
+        """
+        kernel, grid = self.kernel, self.grid
+        if not isinstance(kernel, Kernel):
+            yield self, slice(None), slice(None)
+            return
+        length = max(len(x.weights) for x in (kernel, self.rate_kernel) if x)
+        each = max(1, max(samples, OVERLAP * (length + 2 * reach)) // grid.step)
+        for row in range(0, grid.count, each):
+            count = min(each, grid.count - row)
+            own = grid.first + row * grid.step
+            begin = max(0, own - kernel.before - reach)
+            seen = slice(begin, own + (count - 1) * grid.step - kernel.before + length + reach)
+            there = Grid(own - begin, grid.step, count)
+            rates = self.rate_kernel and replace(self.rate_kernel, grid=there)
+            rows = slice(row, row + count)
+            part = replace(
+                self, grid=there, kernel=replace(kernel, grid=there), rate_kernel=rates, inside=self.inside[..., seen],
+                outside=self.outside[..., rows],
+            )  # fmt: skip
+            yield part, seen, rows
 
     def measurement(self, y: Array) -> Array:
         """Return the rows of B tau, shape (..., kind, time), in the order of Y, shape (..., r)."""

@@ -18,6 +18,9 @@ from idbench.identify.rows.row_map import RowMap, in_order
 PIECE = 6e5
 """Samples times joints squared of a piece: columns grow with the joints squared, and take some 100 MB."""
 
+BYTES = 1.6e7
+"""Of columns that are made at once: they stay in a cache, and little of a log is looked at twice."""
+
 LONG = 1e7
 """Samples times joints squared, of all logs of a fit, beyond which rows are not kept."""
 
@@ -71,18 +74,16 @@ class Rows:
     @classmethod
     def of(cls, equations: Equations, to_rows: RowMap) -> Self:
         """Return the rows that a map makes of a model's equations; raise SettingError where its columns are not finite."""
-        y, columns = _mapped(equations, to_rows)
-        _require_finite(columns, equations)
-        n = equations.kinds
-        count = to_rows.grid.count
-        p = len(equations.names)
-        held = [row for row, place in equations.addresses if place == HELD]
-        y[..., held, :] -= columns[..., : len(held), :]
-        places = equations.addresses[len(held) :]
-        W = np.zeros((*y.shape[:-2], n, p, count))
-        rows, columns_of = np.array(places, dtype=np.intp).reshape(-1, 2).T
-        W[..., rows, columns_of, :] = columns[..., len(held) :, :]
-        W = np.moveaxis(W, -1, -3).reshape(*y.shape[:-2], count * n, p)
+        n, p, count = equations.kinds, len(equations.names), to_rows.grid.count
+        y = to_rows.kernel.apply(to_rows.inside * equations.y) * to_rows.outside
+        W = np.zeros((*y.shape[:-2], count, n, p))
+        # Of each run, however many there are: other stretches might have other bits.
+        for part, samples, rows in to_rows.stretches(int(BYTES / (W.itemsize * n * p)), equations.reach):
+            places, columns = _mapped(equations, part, samples)
+            own = places[:, 1] != HELD
+            W[..., rows, places[own, 0], places[own, 1]] = np.swapaxes(columns[..., own, :], -1, -2)
+            y[..., places[~own, 0], rows] -= columns[..., ~own, :]
+        W = W.reshape(*y.shape[:-2], count * n, p)
         time, valid = np.repeat(to_rows.time, n), in_order(to_rows.outside) > 0
         return cls(in_order(y), W, valid, time, n, equations.names, (to_rows,))
 
@@ -154,30 +155,39 @@ class Rows:
         )
 
 
-def _mapped(equations: Equations, to_rows: RowMap) -> tuple[Array, Array]:
-    """Return the rows of B tau, shape (..., kind, count), and of the columns of c + s e, shape (..., k, count)."""
-    n = equations.kinds
-    places = equations.addresses
+def _mapped(equations: Equations, to_rows: RowMap, samples: slice) -> tuple[npt.NDArray[np.intp], Array]:
+    """Return (row, place in X) of the columns c + s e, shape (k, 2), and what a map makes of them, shape (..., k, count).
+
+    Raises
+    ------
+    SettingError
+        If a column is not finite.
+    """
+    c, e = equations.columns(samples)
     by_parts = to_rows.rate_kernel
-    parts = (equations.c, equations.rates) if by_parts is None else (equations.c,)
-    both = np.zeros((*equations.y.shape[:-2], n + len(places), equations.y.shape[-1]))
-    np.multiply(equations.y, to_rows.inside, out=both[..., :n, :])
+    late = np.stack(list(e.values()), axis=-2) if e else None
+    parts = [c]
+    if late is not None and by_parts is None:
+        rates = equations.signals.s(late)
+        parts.append({place: rates[..., i, :] for i, place in enumerate(e)})
+    places = list(dict.fromkeys((*c, *e)))
+    both = np.zeros((*equations.y.shape[:-2], len(places), to_rows.inside.shape[-1]))
     for i, place in enumerate(places):
         if found := [columns[place] for columns in parts if place in columns]:
-            np.multiply(sum(found[1:], start=found[0]), to_rows.inside[..., place[0], :], out=both[..., n + i, :])
-    filtered = to_rows.kernel.apply(both)
-    y, columns = filtered[..., :n, :], filtered[..., n:, :]
-    if by_parts is not None and equations.e:
-        late = [places.index(place) for place in equations.e]
-        columns[..., late, :] += by_parts.apply(np.stack(list(equations.e.values()), axis=-2))
-    return y * to_rows.outside, columns * to_rows.outside[..., [row for row, _ in places], :]
+            np.multiply(sum(found[1:], start=found[0]), to_rows.inside[..., place[0], :], out=both[..., i, :])
+    columns = to_rows.kernel.apply(both)
+    if late is not None and by_parts is not None:
+        columns[..., [places.index(place) for place in e], :] += by_parts.apply(late)
+    _require_finite(columns, places, equations.names)
+    found = np.array(places, dtype=np.intp).reshape(-1, 2)
+    return found, columns * to_rows.outside[..., found[:, 0], :]
 
 
-def _require_finite(columns: Array, equations: Equations) -> None:
+def _require_finite(columns: Array, places: Sequence[tuple[int, int]], names: Sequence[str]) -> None:
     """Raise SettingError that names the columns which are not finite."""
     if np.isfinite(columns).all():
         return
     finite = np.isfinite(columns).reshape(-1, *columns.shape[-2:])
-    lost = [place for i, (_, place) in enumerate(equations.addresses) if not finite[:, i].all()]
-    names = ", ".join(dict.fromkeys("what is known" if place == HELD else equations.names[place] for place in lost))
-    raise SettingError(f"the columns of {names} are not finite on this motion: correct the block that makes them")
+    lost = [place for i, (_, place) in enumerate(places) if not finite[:, i].all()]
+    which = ", ".join(dict.fromkeys("what is known" if place == HELD else names[place] for place in lost))
+    raise SettingError(f"the columns of {which} are not finite on this motion: correct the block that makes them")

@@ -46,8 +46,8 @@ class Solver(AbstractEstimator):
 @pytest.mark.parametrize(
     ("do", "error", "message"),
     [
-        (lambda qd: None, PluginError, r"Law\.force returned None, expected an array of numbers, shape \(2, 4600\)"),
-        (lambda qd: qd[0], PluginError, r"Law\.force returned an array of float64, shape \(4600,\), expected"),
+        (lambda qd: None, PluginError, r"Law\.force returned None, expected an array of numbers, shape \(2, \d+\)"),
+        (lambda qd: qd[0], PluginError, r"Law\.force returned an array of float64, shape \(\d+,\), expected"),
         (lambda qd: qd * np.nan, SettingError, "friction law Law gives nan at q = .*, qd = .*: let it be finite"),
         (
             lambda qd: np.divide(1.0, qd, where=qd != 0, out=np.full(qd.shape, np.inf)),

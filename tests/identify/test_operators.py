@@ -40,11 +40,17 @@ def equations(y, c, e, weight, t=T):
     signals = SimpleNamespace(
         fs=fs,
         s=lambda x: CentralDifference(6).derivative(x, fs),
-        state=SimpleNamespace(q=np.zeros_like(y)),
-        torque=SimpleNamespace(times=lambda _, joint: y[..., joint, :]),
+        state=SimpleNamespace(q=np.zeros_like(y), part=lambda samples: samples),
+        torque=SimpleNamespace(times=lambda _, joint: y[..., joint, :], average=lambda x: x, halo=lambda: 0.0),
+        differentiator=CentralDifference(6),
         weight=weight,
     )
-    return Equations(signals, {(0, 0): 1.0, (1, 1): 1.0}, c, e, ("a", "b"))
+
+
+    def columns(samples):
+        return tuple({place: x[..., samples] for place, x in each.items()} for each in (c, e))
+
+    return Equations(signals, {(0, 0): 1.0, (1, 1): 1.0}, columns, ("a", "b"))
 
 
 def at(operator, sentence):
@@ -117,7 +123,7 @@ def test_leading_axes_are_independent_runs_with_the_same_bits(operator, rng):
     def spread(columns):
         return {address: np.broadcast_to(signal, (3, len(T))) for address, signal in columns.items()}
 
-    together = at(operator, equations(y, spread(one.c), spread(one.e), weight))
+    together = at(operator, equations(y, *map(spread, one.columns(slice(None))), weight))
     for run in range(3):
         alone = at(operator, sentence(y[run], weight[run]))
         np.testing.assert_array_equal(together.Y[run], alone.Y)

@@ -74,7 +74,7 @@ class AbstractWeakForm(AbstractOperator):
         touched = Kernel(np.ones(length), before, grid).apply((weight == 0).astype(np.float64))
         mean = Kernel(np.full(length, 1 / length), before, grid).apply(weight)
         outside = mean * (touched == 0)
-        ones, by_parts = np.ones_like(weight), derivative if equations.e else None
+        ones, by_parts = np.ones_like(weight), derivative if equations.differentiates else None
         return RowMap(equations.signals, equations.B, grid, integral, by_parts, ones, outside, kernels.integral)
 
     @final
