@@ -13,7 +13,7 @@ def minimum(f: Callable[[float], float], low: float, high: float, xtol: float) -
     R. P. Brent, Algorithms for Minimization without Derivatives, Prentice-Hall 1973, chapter 5: through the best three points,
     x, w and v, goes a parabola, whose lowest point is
 
-        x - ((x - w)^2 (f(x) - f(v)) - (x - v)^2 (f(x) - f(w))) / (2 ((x - w) (f(x) - f(v)) - (x - v) (f(x) - f(w))));
+        u = x - ((x - w)^2 (f(x) - f(v)) - (x - v)^2 (f(x) - f(w))) / (2 ((x - w) (f(x) - f(v)) - (x - v) (f(x) - f(w))));
 
     where that would leave the interval, or steps do not halve, a golden section is taken. (`scipy.optimize` has the same and
     takes 0.15 s to load, more than a search.)
@@ -46,7 +46,8 @@ def minimum(f: Callable[[float], float], low: float, high: float, xtol: float) -
         fu = f(u)
         if fu <= fx:
             low, high = (low, x) if u < x else (x, high)
-            (v, fv), (w, fw), (x, fx) = (w, fw), (x, fx), (u, fu)
+            (v, fv), (w, fw) = (w, fw), (x, fx)
+            x, fx = u, fu
             continue
         low, high = (u, high) if u < x else (low, u)
         if fu <= fw or w == x:

@@ -15,7 +15,6 @@ from idbench.identify.blame import expect
 from idbench.identify.plugins import Table
 from idbench.identify.signals.signals import Signals, State
 
-
 STRETCH = 4096
 """Samples whose columns are made at once where they are only summed: those of six joints then take 6 MB."""
 

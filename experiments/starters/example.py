@@ -1,36 +1,69 @@
-"""An example to work on: the file of an arm, and two logs that it recorded."""
+"""An example to work on: the file of an arm, two logs that it recorded, and its true parameters."""
 
+import csv
+import io
 import tempfile
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from idbench.identify import write_log
-from idbench.sim import Robot, load_scenario, run
+import numpy as np
+
+from idbench.identify import BaseParameters, tree_basis, write_log
+from idbench.sim import Robot, kinematic_tree, load_scenario, run
+from idbench.sim.engine.run import ideal_log
 from idbench.sim.trajectories import RandomMoves
 
-ROBOT = "puma560"
 FS = 250.0  # [Hz], of a common robot controller
 DELAY = 0.002
-"""Robot, sampling frequency [Hz], and delay of the torques [s], which no file of the example states."""
+"""Sampling frequency [Hz], and delay of the torques [s], which no file of the example states."""
 
-NOISE = (0.3, 0.6, 0.2, 0.02, 0.02, 0.02)
-"""Of the torques, rms [N m]."""
+NOISE = 0.01
+"""Of the torques, over their own rms: a tenth of what motor currents have, so that a minute's result can be compared."""
 
 LOGS = {"log.csv": 1, "second.csv": 2}
 """Files, and the seeds of their motions."""
 
+MOVES, VELOCITY = 5, 2.0
+"""Moves of a log for each joint, and their largest speeds [rad/s]."""
 
-def example_files() -> dict[str, str]:
-    """Return the files of an example, by their names: an arm in MJCF, and logs of two motions in closed loop."""
-    contents = {"arm.xml": Robot.path(ROBOT).read_text(encoding="utf-8")}
-    plain = load_scenario("arm")
-    scenario = replace(plain, robot=ROBOT, fs=FS, torque=replace(plain.torque, noise=NOISE))
-    for name, seed in LOGS.items():
-        moves = RandomMoves(moves=24, durations=(0.8, 1.6), velocity=(2.0,), rest=0.8, seed=seed)
-        timing = replace(scenario.timing, delay=DELAY)
-        log = run(replace(scenario, trajectory=moves, timing=timing, seed=seed)).alone()
+
+def example_files(name: str) -> dict[str, str]:
+    """Return the files of an example, by their names.
+
+    Parameters
+    ----------
+    name : str
+        Name of a shipped robot.
+
+    Returns
+    -------
+    dict
+        The arm in MJCF, logs of two motions in closed loop, and a table of the true base parameters.
+    """
+    robot, plain = Robot.load(name), load_scenario("arm")
+    contents = {"arm.xml": Robot.path(name).read_text(encoding="utf-8")}
+    for file, seed in LOGS.items():
+        moves = RandomMoves(moves=MOVES * robot.n, durations=(0.8, 1.6), velocity=(VELOCITY,), rest=0.5, seed=seed)
+        tau = ideal_log(robot, moves.sample(robot, FS)).tau
+        torque = replace(plain.torque, noise=tuple((NOISE * np.sqrt(np.mean(tau**2, axis=0))).tolist()))
+        timing = replace(plain.timing, delay=DELAY)
+        done = run(replace(plain, robot=name, fs=FS, torque=torque, trajectory=moves, timing=timing, seed=seed))
         with tempfile.TemporaryDirectory(prefix="idbench-") as folder:
-            path = Path(folder) / name
-            write_log(log, path)
-            contents[name] = path.read_text(encoding="utf-8")
+            path = Path(folder) / file
+            write_log(done.alone(), path)
+            contents[file] = path.read_text(encoding="utf-8")
+    contents["truth.csv"] = _table(robot, done.truth)
     return contents
+
+
+def _table(robot: Robot, standard: Mapping[str, float]) -> str:
+    """Return the true base parameters as CSV."""
+    tree = kinematic_tree(robot)
+    base = BaseParameters.of(tree, tree_basis(tree))
+    text = io.StringIO()
+    rows = zip(base.values(standard).items(), base.basis.units, strict=True)
+    csv.writer(text, lineterminator="\n").writerows(
+        [("parameter", "value", "unit"), *((k, f"{x:.6g}", u) for (k, x), u in rows)]
+    )
+    return text.getvalue()

@@ -15,6 +15,7 @@ from idbench.experiments.errors import ExperimentError, ResultsError
 from idbench.experiments.plugin_tables import TABLES
 from idbench.experiments.results.writing import exchange, folder_for, hidden_folder
 from idbench.identify.plugins import did_you_mean
+from idbench.models import names
 from idbench.sim.scenario.scenario_file import load, to_toml
 
 NAME = re.compile(r"[A-Za-z]([A-Za-z0-9_-]*[A-Za-z0-9])?")
@@ -57,13 +58,21 @@ def new_study(name: str, out: Path) -> None:
     _write(out, {"": _rendered("study.toml.j2", {"name": _checked(name)})})
 
 
-def new_example(name: str, out: Path) -> None:
-    """Write an arm and two of its logs into a new folder; raise ExperimentError if that is not possible."""
+def new_example(name: str, robot: str, out: Path) -> None:
+    """Write a shipped arm, two of its logs and its true parameters into a new folder.
+
+    Raises
+    ------
+    ExperimentError
+        If there is no such robot, or something is there already.
+    """
     from idbench.experiments.starters.example import example_files
 
     _checked(name)
     _require_free(out)
-    _write(out, example_files())
+    if robot not in names():
+        raise ExperimentError(f"no shipped robot {robot!r}{did_you_mean(robot, names())}; known: {', '.join(names())}")
+    _write(out, example_files(robot))
 
 
 def new_set(name: str, out: Path) -> str:

@@ -13,7 +13,7 @@ from idbench.identify.basis.friction.laws import CoulombFriction, ViscousFrictio
 from idbench.identify.basis.friction.load import TiedFriction
 from idbench.identify.basis.joint_law import AbstractFriction, Armature
 from idbench.identify.basis.of_joints import Coupled, OfJoints
-from idbench.identify.basis.replay import Replay, recorded_motion
+from idbench.identify.basis.replay import Program, recorded_motion
 from idbench.identify.basis.springs import Spring
 from idbench.identify.basis.tape import Tape
 from idbench.identify.basis.twists import (
@@ -179,14 +179,16 @@ def _massive(tree: KinematicTree) -> tuple[int, ...]:
     return tuple(j for j, joint in enumerate(tree.joints) if joint.massive)
 
 
-def _asked(columns: Mapping[tuple[int, Parameter], Term], only: frozenset[Parameter] | None) -> dict[tuple[int, Parameter], Any]:
+def _asked(
+    columns: Mapping[tuple[int, Parameter], Term], only: frozenset[Parameter] | None
+) -> dict[tuple[int, Parameter], Any]:
     return {key: x for key, x in columns.items() if (only is None or key[1] in only) and not is_zero(x)}
 
 
 @lru_cache(maxsize=64)
-def _replay(tree: KinematicTree, only: frozenset[Parameter] | None, function: str) -> Replay[tuple[int, Parameter]]:
+def _replay(tree: KinematicTree, only: frozenset[Parameter] | None, function: str) -> Program[tuple[int, Parameter]]:
     tape, columns = _recorded(tree, function)
-    return Replay(tape, _asked(columns, only))
+    return Program(tape, _asked(columns, only))
 
 
 @lru_cache(maxsize=32)

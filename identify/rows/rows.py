@@ -179,8 +179,8 @@ def _mapped(equations: Equations, to_rows: RowMap, samples: slice) -> tuple[npt.
     if late is not None and by_parts is not None:
         columns[..., [places.index(place) for place in e], :] += by_parts.apply(late)
     _require_finite(columns, places, equations.names)
-    found = np.array(places, dtype=np.intp).reshape(-1, 2)
-    return found, columns * to_rows.outside[..., found[:, 0], :]
+    where = np.array(places, dtype=np.intp).reshape(-1, 2)
+    return where, columns * to_rows.outside[..., where[:, 0], :]
 
 
 def _require_finite(columns: Array, places: Sequence[tuple[int, int]], names: Sequence[str]) -> None:

@@ -60,7 +60,9 @@ class State:
     def part(self, samples: slice) -> Self:
         """Return the motion at some samples, with the velocities and accelerations that it has there."""
         conditions = {name: x[..., samples] for name, x in self.conditions.items()}
-        return replace(self, q=self.q[..., samples], qd=self.qd[..., samples], s=lambda _: self.qdd[..., samples], conditions=conditions)
+        return replace(
+            self, q=self.q[..., samples], qd=self.qd[..., samples], s=lambda _: self.qdd[..., samples], conditions=conditions
+        )
 
     def shared(self, key: object, make: Callable[[Self], T]) -> T:
         """Return `make(self)`, computed once for all that ask with the same `key`."""

@@ -46,7 +46,6 @@ def equations(y, c, e, weight, t=T):
         weight=weight,
     )
 
-
     def columns(samples):
         return tuple({place: x[..., samples] for place, x in each.items()} for each in (c, e))
 

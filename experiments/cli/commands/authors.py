@@ -27,7 +27,7 @@ def begin(options: New) -> None:
         how = f"get the data, in {out}:\n{new_set(options.name, out).strip()}\nthen: {then}"
     elif options.what == "example":
         with stages_of("simulating an arm"):
-            new_example(options.name, out)
+            new_example(options.name, options.robot, out)
         how = f"uv run idbench identify {out / 'log.csv'} --robot {out / 'arm.xml'} --torque held --torque-delay estimate"
     else:
         new_plugin(options.name, options.kind, out)

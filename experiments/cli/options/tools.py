@@ -152,6 +152,8 @@ class New(Command, action="authors:begin"):
     controller, drive or encoder."""
     like: Annotated[str, Word("SCENARIO")] = "ideal"
     """Scenario to copy."""
+    robot: Annotated[str, Word("NAME")] = "two_link"
+    """Shipped robot of an example."""
     out: File = None
     """File or folder to write. Default: NAME.toml, or NAME."""
 
