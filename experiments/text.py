@@ -119,7 +119,13 @@ def of_each(said: Iterable[tuple[str, str]]) -> list[str]:
 def new_table(title: str, columns: Iterable[str]) -> Table:
     """Return an empty table, its first column of names, the others of numbers."""
     grid = Table(
-        title=title, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0)
+        title=title,
+        title_justify="left",
+        title_style="bold",
+        box=box.SIMPLE_HEAD,
+        show_edge=False,
+        pad_edge=False,
+        padding=(0, 1, 0, 0),
     )
     grid.add_column("", no_wrap=True)
     for heading in columns:

@@ -27,7 +27,7 @@ from idbench.identify import Array, MotionLog, Problem, State, Validation, valid
 from idbench.identify.arrays import combined
 from idbench.identify.judge.torque_interval import torque_interval
 from idbench.identify.rows.rows import manageable
-from idbench.identify.tables import html_table, significant, text_table
+from idbench.identify.tables import concise, html_table, text_table
 from idbench.sim.engine.run import Run
 from idbench.sim.robot.robot import Robot
 
@@ -134,7 +134,7 @@ class Identification:
     @property
     def verdict(self) -> str:
         """The verdict on held-out data in one sentence, and what to check first."""
-        return conclusion(self.judgement, self.doubts)
+        return "; ".join(conclusion(self.judgement, self.doubts))
 
     def predict(
         self, q: Array, qd: Array, qdd: Array, model: str | None = None, *, interval: float | None = None
@@ -261,14 +261,14 @@ class Identification:
 
     def _table(self) -> tuple[str, list[str], list[list[str]]]:
         known = self.fit.truth is not None
-        heads = [f"{self.model} model", "value", "sigma", "%sigma", "unit", *(["truth"] if known else [])]
+        heads = [f"{self.model} model", "value", "unit", "%sigma", *(["truth"] if known else [])]
         return f"{self.fit.logs.title}, {self.fit.request.estimator}", heads, list(self._rows())
 
     def _rows(self) -> Iterator[list[str]]:
         functions = {p.name for p in self.fit.basis.parameters if p.is_random_effect}
         for p in (p for p in self.parameters.values() if p.name not in functions):
             share = f"{100 * p.sigma / abs(p.value):.2g}" if p.value else ""
-            yield [p.name, *significant(p.value, p.sigma), share, p.unit, *([] if p.truth is None else [f"{p.truth:.6g}"])]
+            yield [p.name, concise(p.value, p.sigma), p.unit, share, *([] if p.truth is None else [f"{p.truth:.6g}"])]
 
 
 @final

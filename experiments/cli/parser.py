@@ -67,9 +67,10 @@ def _marks(hint: Any, default: object) -> list[Any]:
     word = word_of(hint)
     metavar, unsaid = word.metavar if word.made is None else "", default is None or default == ()
     marks = list[Any]()
-    if metavar or word.option or unsaid:
+    if metavar or word.option or word.short or unsaid:
         said = "" if unsaid else None
-        marks.append(tyro.conf.arg(name=word.option or None, metavar=metavar or None, help_behavior_hint=said))
+        short = [word.short] if word.short else None
+        marks.append(tyro.conf.arg(name=word.option or None, aliases=short, metavar=metavar or None, help_behavior_hint=said))
     if word.made is not None:
         marks.append(_one(word))
     if word.positional:

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from math import isfinite, log10
+from math import isfinite
 
 import numpy as np
 
@@ -13,10 +13,8 @@ from idbench.experiments.judgement.judgement import Judgement
 from idbench.experiments.judgement.warnings import FLAGS, doubtful, used
 from idbench.experiments.text import WORTHLESS, error_percentage, number, percent, percentage
 from idbench.identify import Estimate
-from idbench.identify.arrays import TINY, Array
-
-LEAST_PERCENT = 0.01
-"""%sigma without a bar: such a parameter is known better than anybody needs."""
+from idbench.identify.arrays import Array
+from idbench.identify.tables import concise
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,22 +35,14 @@ class EstimatesTable:
     def heads(self) -> list[tuple[str, str]]:
         """The two lines above each column but the first."""
         known = self.fit.truth is not None
-        what = ("X", "%e", "%sigma") if known else ("X", "sigma", "of noise", "%sigma")
-        return [("true", "X")] * known + [(model, each) for model in self.estimates for each in what]
+        what = ("X", "%e", "%sigma") if known else ("X", "%sigma")
+        return [("", "unit"), *[("true", "X")] * known, *((model, each) for model in self.estimates for each in what)]
 
     def rows(self) -> Iterator[list[str]]:
         """Yield the cells of every parameter, its name first; marks stand behind what is doubtful."""
         for i, name in self._shown:
             each = (self._cells(model, estimate, i) for model, estimate in self.estimates.items())
-            yield [name, *self._true(i), *(cell for cells in each for cell in cells)]
-
-    def bars(self, cells: int) -> Iterator[str]:
-        """Yield a bar of the last model's %sigma for every parameter, on a logarithmic scale from 0.01 % to 100 %."""
-        estimate = list(self.estimates.values())[-1]
-        for i, _ in self._shown:
-            x, sigma = estimate.X[i], estimate.standard_errors[i]
-            share = log10(max(100 * sigma / max(abs(x), TINY), TINY) / LEAST_PERCENT) / log10(100 / LEAST_PERCENT)
-            yield ("#" * round(cells * min(max(share, 0.0), 1.0))).ljust(cells)
+            yield [name, self.fit.basis.units[i], *self._true(i), *(cell for cells in each for cell in cells)]
 
     def short(self) -> Iterator[list[str]]:
         """Yield the truth and the estimates alone, with all marks."""
@@ -62,7 +52,7 @@ class EstimatesTable:
 
     def whole(self) -> Iterator[list[str]]:
         """Yield the cells of what is said of each fit as a whole."""
-        estimates, before = self.estimates.values(), [""] * (self.fit.truth is not None)
+        estimates, before = self.estimates.values(), [""] * (1 + (self.fit.truth is not None))
         every = {"Cond(W)": [f"{e.condition_number:.1f}" for e in estimates], "rows": [f"{e.row_count}" for e in estimates]}
         for j in range(self.fit.basis.n):
             every[f"tau{j + 1} explained"] = [_explained(self.fit.explained[model][j]) for model in self.estimates]
@@ -78,7 +68,7 @@ class EstimatesTable:
     @property
     def _width(self) -> int:
         """Columns of a model."""
-        return 3 if self.fit.truth is not None else 4
+        return 3 if self.fit.truth is not None else 2
 
     @cached_property
     def legend(self) -> str:
@@ -94,16 +84,14 @@ class EstimatesTable:
         return [] if self.fit.truth is None else [f"{list(self.fit.truth.values())[i]:g}"]
 
     def _cells(self, model: str, estimate: Estimate, i: int) -> Iterator[str]:
+        x, sigma = estimate.X[i], estimate.standard_errors[i]
+        share = percentage(100 * sigma / abs(x) if x else float("inf")) or f">{WORTHLESS:g}"
+        first, second, last = self._marks[model][i] if self.legend else ("", "", "")
         if self.fit.truth is None:
-            own = [f"{estimate.standard_errors[i]:.2g}", f"{estimate.noise_sigma[i]:.2g}"]
-        else:
-            error = float(estimate.error_percent(list(self.fit.truth.values()))[i])
-            own = [percent(error) if isfinite(error) else ""]
-        share = 100 * estimate.standard_errors[i] / abs(estimate.X[i]) if estimate.X[i] else float("inf")
-        cells = number(estimate.X[i]), *own, percentage(share) or f">{WORTHLESS:g}"
-        first, *others, last = self._marks[model][i] if self.legend else ("", "", "")
-        marks = first, *others, *[""] * (len(own) - 1), last
-        return (f"{cell}{mark}" for cell, mark in zip(cells, marks, strict=True))
+            yield from (f"{concise(x, sigma)}{first}", f"{share}{last}")
+            return
+        error = float(estimate.error_percent(list(self.fit.truth.values()))[i])
+        yield from (f"{number(x)}{first}", f"{percent(error) if isfinite(error) else ''}{second}", f"{share}{last}")
 
 
 def markdown(title: str, heads: Sequence[str], rows: Iterator[list[str]]) -> str:
@@ -118,19 +106,13 @@ def _explained(share: float) -> str:
     return f"{100 * share:.3f} %" if share > -WORTHLESS / 100 else f"<-{WORTHLESS:g} %"
 
 
-FEW = 3
-"""Joints up to which tables of all models can be seen at once."""
-
 SAME = 0.99
 """Errors in multiples of an earlier model's from which on a later one is no better."""
 
 
 def shown_whole(fit: Fit, asked: bool) -> tuple[str, ...]:
-    """Return the models whose tables are shown whole: all if they were asked for, or joints are few; else the leading one."""
-    every = tuple(fit.estimates)
-    if asked or fit.basis.n <= FEW or len(every) < 2:
-        return every
-    return (leading({model: np.sqrt(np.maximum(1 - share, 0)) for model, share in fit.explained.items()}),)
+    """Return the models whose tables are shown whole: all if they were asked for, else the first."""
+    return tuple(fit.estimates) if asked else tuple(fit.estimates)[:1]
 
 
 def leading(errors: Mapping[str, Array]) -> str:
@@ -143,28 +125,28 @@ def leading(errors: Mapping[str, Array]) -> str:
     return first
 
 
-def in_lines(fit: Fit, whole: Sequence[str]) -> Iterator[str]:
-    """Yield a line of each model on its fit as a whole, and how far those are from the leading one that are not shown whole."""
-    lead = fit.estimates[whole[0]]
+def differing(fit: Fit, whole: Sequence[str]) -> Iterator[str]:
+    """Yield a line on how far the models are from the leading one that are not shown whole."""
+    lead, far = fit.estimates[whole[0]], dict[str, float]()
     for model, estimate in fit.estimates.items():
-        share = _range(fit.explained[model])
-        words = f"{model}: Cond(W) {estimate.condition_number:.1f}, {estimate.row_count} rows, explains {share} of the torques"
         if model not in whole:
             sigma = np.maximum(np.hypot(estimate.standard_errors, lead.standard_errors), 1e-300)
-            far = float(np.max(np.abs(estimate.X - lead.X) / sigma))
-            words += f"; parameters within {far:.2g} sigma of the {whole[0]} model's (--model {model} shows them)"
-        yield words
+            far[model] = float(np.max(np.abs(estimate.X - lead.X) / sigma))
+    if far:
+        each = ", ".join(f"{model} by at most {x:.1g} sigma" for model, x in far.items())
+        yield f"other models differ: {each} (--model all shows them)"
 
 
-def _range(share: Array) -> str:
+def explained(share: Array) -> str:
+    """Return which shares of the torques, shape (joint,), a model explains, in words."""
     known = 100 * share[np.isfinite(share)]
     return f"{max(known.min(), 0):.3f} to {known.max():.3f} %" if known.size else "nothing"
 
 
-def conclusion(judgement: Judgement, warnings: Mapping[str, Sequence[str]]) -> str:
+def conclusion(judgement: Judgement, warnings: Mapping[str, Sequence[str]]) -> tuple[str, str]:
     """Return one sentence on the hardest held-out log, and the next step."""
     first = next((about for about, found in warnings.items() if found), "")
-    return f"{_found(judgement.hardest)}; {_next(judgement, first)}"
+    return _found(judgement.hardest), _next(judgement, first)
 
 
 def _found(one: HeldOut | None) -> str:

@@ -16,82 +16,104 @@ from idbench.experiments.identification.iterations import words_of_iterations
 from idbench.experiments.judgement.held_out import HeldOut
 from idbench.experiments.judgement.judgement import Unjudged
 from idbench.experiments.judgement.remedies import SURE
-from idbench.experiments.reports.estimates import EstimatesTable, in_lines, leading
+from idbench.experiments.reports.estimates import EstimatesTable, differing, explained, leading
 from idbench.experiments.reports.uncertainty import words_of_uncertainty
-from idbench.experiments.text import WORTHLESS, new_table, percentage, print_titled
+from idbench.experiments.text import new_table, percentage, print_titled
 from idbench.identify import Array, AsLogged
 from idbench.identify.judge.torque_interval import LEVEL, MOST
 
-BARS, BAR_HEAD = 8, "0.01..100"
-"""Cells of the bar of a standard error, and what is written above: a full bar is 100 % of the value, an empty one 0.01 %."""
+ONE_BELOW_THE_OTHER = 16
+"""Parameters up to which each has a line of its own; more stand beside each other, as far as the screen is wide."""
 
 
-def print_fit(console: Console, fit: Fit, title: str, whole: tuple[str, ...]) -> None:
-    """Print truth, if it is known, and of models estimate, error or sigma, %sigma, Cond(W) and what is explained.
+def print_fit(console: Console, fit: Fit, title: str, whole: tuple[str, ...], *, verbose: bool = False) -> None:
+    """Print the estimates: value with standard error, unit and %sigma, or truth and error where that is known.
 
-    Those that are not among the `whole` ones have a line each. Sigma is the corrected one; the paper's is in the summary.
+    Models that are not among the `whole` ones have a line each.
+
+    Parameters
+    ----------
+    console : Console
+        Where to.
+    fit : Fit
+        The fit.
+    title : str
+        What was identified.
+    whole : tuple of str
+        Models whose estimates are shown.
+    verbose : bool
+        Whether Cond(W), rows, noise, correlations and iterations are shown, too.
     """
     table = EstimatesTable(fit, whole)
-    what = f"{title}: chain {fit.request.chain}, {fit.request.estimator}"
-    print_titled(console, what, _grid(table), 1 + (fit.truth is not None))
+    of = f"{whole[0]} model, " if len(whole) == 1 else ""
+    grid = _grid(table, console.width, verbose or fit.truth is not None)
+    print_titled(console, f"{title}: {of}{fit.request.estimator}, chain {fit.request.chain}", grid, 2 + (fit.truth is not None))
     if table.legend:
         console.print(Text(table.legend))
-    for words in (*(in_lines(fit, whole) if len(whole) < len(fit.estimates) else ()), *_told(fit)):
+    for words in (*differing(fit, whole), *_told(fit), *(_details(fit) if verbose else ())):
         console.print(Text(words), soft_wrap=True)
     if len(fit.logs.fitted) > 1 and fit.torque_errors:
         _print_logs(console, fit)
     console.print()
 
 
-def _grid(table: EstimatesTable) -> Table:
-    """Return the table of the parameters, and of the fit as a whole."""
+def _grid(table: EstimatesTable, width: int, complete: bool) -> Table:
+    """Return the table of the parameters, and of the fit as a whole if it shall be complete."""
     heads, rows = [f"{first}\n{second}" for first, second in table.heads], list(table.rows())
-    if len(table.estimates) < len(table.fit.estimates):
-        bars = [[*cells, bar] for cells, bar in zip(rows, table.bars(BARS), strict=True)]
-        return _halved([*heads, f"{table.heads[-1][0]}\n{BAR_HEAD}"], bars)
+    if len(table.estimates) == 1:
+        plain = ["", "value", "unit", "%sigma"] if table.fit.truth is None else ["", "unit", "true", "value", "%e", "%sigma"]
+        return _beside(plain, [_ordered(cells) if table.fit.truth is None else cells for cells in rows], width)
     grid = new_table("", heads)
     for cells in rows:
         grid.add_row(*cells)
-    grid.add_section()
-    for cells in table.whole():
-        grid.add_row(*cells)
+    if complete:
+        grid.add_section()
+        for cells in table.whole():
+            grid.add_row(*cells)
     return grid
 
 
-def _halved(heads: list[str], rows: list[list[str]]) -> Table:
-    """Return a long table of few columns with its second half beside the first."""
-    grid, half = new_table("", heads), (len(rows) + 1) // 2
-    grid.add_column("", no_wrap=True)
-    for heading in heads:
-        grid.add_column(heading, justify="right", no_wrap=True)
-    for left, right in zip_longest(rows[:half], rows[half:], fillvalue=()):
-        grid.add_row(*left, *right)
-    for column in grid.columns:
-        if str(column.header).endswith(BAR_HEAD):
-            column.justify = "left"
+def _ordered(cells: Sequence[str]) -> list[str]:
+    """Return name, unit, value and %sigma in the order in which they are read."""
+    name, unit, value, share = cells
+    return [name, value, unit, share]
+
+
+def _beside(heads: list[str], rows: list[list[str]], width: int) -> Table:
+    """Return a table of few columns, in parts beside each other where it is long and there is room."""
+    each = sum(2 + max(len(row[k]) for row in (heads, *rows)) for k in range(len(heads)))
+    parts = max(1, (width + 2) // each) if len(rows) > ONE_BELOW_THE_OTHER else 1
+    grid, count = new_table("", heads[1:]), -(-len(rows) // parts)
+    for _ in range(1, parts):
+        grid.add_column("", no_wrap=True)
+        for heading in heads[1:]:
+            grid.add_column(heading, justify="right", no_wrap=True)
+    for beside in zip_longest(*(rows[k : k + count] for k in range(0, len(rows), count)), fillvalue=()):
+        grid.add_row(*(Text(cell, _style(cells)) for cells in beside for cell in cells))
     return grid
+
+
+def _style(cells: Sequence[str]) -> str:
+    """Return how a parameter is written: what must be positive and is not, or is far off, in red; below one sigma in grey."""
+    if any(cell.endswith(("!", "*")) for cell in cells):
+        return "red"
+    share = cells[-1].rstrip("? ")
+    return "dim" if share.startswith(">") or (share and float(share) > 100) else ""
 
 
 def _told(fit: Fit) -> Iterator[str]:
-    """Yield what else is to be known: models that failed, torque and delay, noise, rounds, what was moved."""
+    """Yield what a reader of the estimates must know: models that failed, torque and delay, what was held or masked."""
     for model, why in fit.failures.items():
         yield f"{model}: no estimate: {why}"
     channel = fit.logs.fitted[0].torque
     ignored = f", which chain {fit.request.chain} ignores: it takes it as logged"
     logged = isinstance(fit.processing.alignment, AsLogged)
-    if fit.rates:
-        yield str(fit.rates)
     asked = fit.robot_model.asked
     if asked.hold or asked.tie:
         known = (("held", asked.hold), ("tied", asked.tie))
         yield "; ".join(f"{what}: {', '.join(words)}" for what, words in known if words)
     if not fit.logs.fitted[0].poses:
         yield f"torque: {channel.meaning}, delay {channel.late}{ignored if logged else ''}"
-    if channel.delay_sigma:
-        without = [name for name, estimate in fit.estimates.items() if not estimate.knows_delay]
-        but = f", but for {', '.join(without)}" if without else ""
-        of_delay = ", ".join(f"{1e3 * x:.2g}" for x in np.atleast_1d(channel.delay_sigma))
-        yield f"the standard errors contain that of the delay, {of_delay} ms{but}"
     if fit.delay is not None:
         delay, sigma = (1e3 * x for x in fit.delay)
         words = f"delay found with the parameters: {delay:.4g} ms, sigma {sigma:.2g} ms"
@@ -99,16 +121,11 @@ def _told(fit: Fit) -> Iterator[str]:
             words += f"; what follows judges them at {1e3 * channel.delay:.4g} ms: give --torque-delay {1e-3 * delay:.4g}"
         yield words
     yield from _rotors(fit)
+    yield from words_of_iterations(fit)
     if fit.raised:
         joints, speeds = fit.robot_model.robot.joints, fit.request.mask_speed
         each = ", ".join(f"{joints[j]} up to {speeds[j]:.2g} {fit.robot_model.units(j)[1]}/s" for j in fit.raised)
         yield f"slow motion is masked, because its friction differs from that of faster motion: {each} (--mask-speed)"
-    yield _noise(fit)
-    yield from words_of_uncertainty(fit)
-    yield words_of_diagnosis(fit.diagnosis)
-    yield from words_of_iterations(fit)
-    for model, why in fit.left_out.items():
-        yield f"{model}: reversals are left out, as ML does: {why}"
     if fit.request.smooth:
         sizes = " ".join(f"{x:.2g}" for x in fit.request.smooth)
         unit = ", ".join(dict.fromkeys(fit.robot_model.units(j)[0] for j in range(fit.basis.n)))
@@ -117,6 +134,26 @@ def _told(fit: Fit) -> Iterator[str]:
         share = fit.request.share or fit.robot_model.roughly_known.share
         near = f"; links near the file's, to {100 * share:.0f} % as the log decides" if fit.request.share and share else ""
         yield f"roughly known: {', '.join(fit.robot_model.asked.prior)}{near}"
+
+
+def _details(fit: Fit) -> Iterator[str]:
+    """Yield how each model fits, rates, noise, what limits the standard errors, mistakes, iterations."""
+    for model, estimate in fit.estimates.items():
+        share = explained(fit.explained[model])
+        yield f"{model}: Cond(W) {estimate.condition_number:.1f}, {estimate.row_count} rows, explains {share} of the torques"
+    if fit.rates:
+        yield str(fit.rates)
+    channel = fit.logs.fitted[0].torque
+    if channel.delay_sigma:
+        without = [name for name, estimate in fit.estimates.items() if not estimate.knows_delay]
+        but = f", but for {', '.join(without)}" if without else ""
+        of_delay = ", ".join(f"{1e3 * x:.2g}" for x in np.atleast_1d(channel.delay_sigma))
+        yield f"the standard errors contain that of the delay, {of_delay} ms{but}"
+    yield _noise(fit)
+    yield from words_of_uncertainty(fit)
+    yield words_of_diagnosis(fit.diagnosis)
+    for model, why in fit.left_out.items():
+        yield f"{model}: reversals are left out, as ML does: {why}"
 
 
 def _print_logs(console: Console, fit: Fit) -> None:
@@ -163,43 +200,59 @@ def _noise(fit: Fit) -> str:
     return f"{words}; encoder steps {' '.join(f'{x:.3g}' if x else '?' for x in steps)} {length} ({bits} bits)"
 
 
-def print_held_out(console: Console, one: HeldOut | Unjudged, whole: Sequence[str]) -> None:
-    """Print how well torques of a held-out log are predicted, what the simulated robot does on it, and verdicts.
+def print_held_out(console: Console, one: HeldOut | Unjudged, whole: Sequence[str], *, verbose: bool = False) -> None:
+    """Print how well torques of a held-out log are predicted, and what the simulated robot does on it.
 
-    Of several models of which not all are shown `whole` that which predicts best has the table.
+    Parameters
+    ----------
+    console : Console
+        Where to.
+    one : HeldOut or Unjudged
+        The log, and the fit on it.
+    whole : sequence of str
+        Models that are shown.
+    verbose : bool
+        Whether intervals and the verdict on each model are shown, too.
     """
     if isinstance(one, Unjudged):
         console.print(Text(f"not judged on {one.title}: {one.why}\n"), soft_wrap=True)
         return
-    best = leading({model: validation.rms for model, validation in one.torques.items()})
-    torques = one.torques if len(whole) == len(one.torques) else {best: one.torques[best]}
+    torques = {model: validation for model, validation in one.torques.items() if model in whole} or one.torques
     joints = one.fit.robot_model.robot.joints
     simulated = any(one.position_error(model) is not None for model in torques)
-    heads = [f"{model}\n{what}" for model in torques for what in ("rms", "%", "R2", "q rms")[: 3 + simulated]]
-    grid, first = new_table("", ["noise,\nat most %", *heads]), next(iter(torques.values()))
+    torque, position = (
+        ", ".join(dict.fromkeys(each)) for each in zip(*map(one.fit.robot_model.units, range(len(joints))), strict=True)
+    )
+    what = (f"rms [{torque}]", "%", *((f"position [{position}]",) * simulated))
+    heads = [f"{model}\n{each}" if len(torques) > 1 else each for model in torques for each in what]
+    grid, first = new_table("", [*heads, "noise %, at most"]), next(iter(torques.values()))
     for j, joint in enumerate(joints):
         noise = percentage(first.percent_of_level(first.noise)[j])
-        cells = (cell for model in torques for cell in _held_out_cells(one, model, j)[: 3 + simulated])
-        grid.add_row(joint, noise, *cells)
-    what = f"torque error{'' if one.log.poses else ' while moving'} [N m, N]" + (
-        ", position error of the simulated robot [rad, m]" if simulated else ""
-    )
-    print_titled(console, f"{one.title}: {what}", grid, 2)
+        cells = (cell for model in torques for cell in _held_out_cells(one, model, j)[: len(what)])
+        grid.add_row(joint, *cells, noise)
+    title = f"torque error{'' if one.log.poses else ' while moving'}{', position error of the simulated robot' * simulated}"
+    print_titled(console, f"{one.title}: {title}", grid)
+    for model in (model for model, v in one.verdicts.items() if model in torques and v.unsimulated):
+        console.print(Text(f"{model}: not simulated: {one.verdicts[model].unsimulated}"), soft_wrap=True)
+    for words in _details_of(one, first.standing) if verbose else ():
+        console.print(Text(words), soft_wrap=True)
+    console.print()
+
+
+def _details_of(one: HeldOut, standing: Array) -> Iterator[str]:
+    """Yield intervals, errors at rest, and the verdict on each model."""
+    best = leading({model: validation.rms for model, validation in one.torques.items()})
+    joints = one.fit.robot_model.robot.joints
     if (within := one.within_interval(best)) is not None and one.fit.torque_intervals[best] is not None:
-        console.print(Text(_interval_words(one, best, *within)), soft_wrap=True)
-    apart = [f"{joint} {rms:.2g}" for joint, rms in zip(joints, first.standing, strict=True) if isfinite(rms)]
+        yield _interval_words(one, best, *within)
+    apart = [f"{joint} {rms:.2g}" for joint, rms in zip(joints, standing, strict=True) if isfinite(rms)]
     if apart:
-        console.print(Text(f"at rest and reversing, where friction is not determined: {', '.join(apart)} N m"), soft_wrap=True)
+        yield f"at rest and reversing, where friction is not determined: {', '.join(apart)} N m"
     for words, (model, *others) in _alike({model: (v.word, *v.reasons) for model, v in one.verdicts.items()}).items():
         same = f" ({', '.join(others)}: the same)" if others else ""
-        console.print(Text(f"{model}: {words[0]}: {'; '.join(words[1:])}{same}"), soft_wrap=True)
-    reasons = dict.fromkeys(verdict.unsimulated for verdict in one.verdicts.values() if verdict.unsimulated)
-    for why in reasons:
-        models = [model for model, verdict in one.verdicts.items() if verdict.unsimulated == why]
-        console.print(Text(f"{', '.join(models)}: not simulated: {why}"), soft_wrap=True)
+        yield f"{model}: {words[0]}: {'; '.join(words[1:])}{same}"
     for model, why in one.fit.failures.items():
-        console.print(Text(f"{model}: not judged: {why}"), soft_wrap=True)
-    console.print()
+        yield f"{model}: not judged: {why}"
 
 
 def _interval_words(one: HeldOut, model: str, inside: Array, outside: float) -> str:
@@ -229,9 +282,8 @@ def _alike(verdicts: Mapping[str, tuple[str, ...]]) -> dict[tuple[str, ...], lis
     return found
 
 
-def _held_out_cells(one: HeldOut, model: str, j: int) -> tuple[str, str, str, str]:
+def _held_out_cells(one: HeldOut, model: str, j: int) -> tuple[str, str, str]:
     validation, off = one.torques[model], one.position_error(model)
     if not isfinite(validation.rms[j]):
-        return "", "", "", ""
-    R2 = f"{validation.R2[j]:.5f}" if validation.R2[j] > -WORTHLESS else f"<-{WORTHLESS:g}"
-    return f"{validation.rms[j]:.2g}", percentage(validation.percent[j]), R2, "" if off is None else f"{off[j]:.1e}"
+        return "", "", ""
+    return f"{validation.rms[j]:.2g}", percentage(validation.percent[j]), "" if off is None else f"{off[j]:.1e}"

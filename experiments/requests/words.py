@@ -23,6 +23,8 @@ class Word:
     """Whether it is typed without a name."""
     flag: bool = False
     """Whether it is switched on alone, never off."""
+    short: str = ""
+    """Another name of its option, such as -v."""
     file: bool = False
     """Whether it names a file: what a file names is looked for beside that file."""
 
@@ -59,5 +61,8 @@ Names = Annotated[tuple[str, ...], Word("NAME")]
 Letters = Annotated[tuple[str, ...], Word("LETTER")]
 Joints = Annotated[tuple[str, ...], Word("JOINT")]
 Laws = Annotated[tuple[str, ...], Word("[JOINT=]LAW+LAW")]
+Verbose = Annotated[bool, Word(flag=True, short="-v")]
+"""Whether details are printed, too."""
+
 Json = Annotated[bool, Word(flag=True)]
 """Whether standard output is for a program: what summary.json has, and warnings; text goes to the error stream."""

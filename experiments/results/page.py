@@ -144,10 +144,9 @@ class Page(Console):
         if len(there) > 1:
             self.print(Text("Check these first, in this order:", style="bold"))
         for number, (about, warnings) in enumerate(there.items(), 1):
-            if len(there) > 1:
-                self.print(Text(f"{number}. {about}"))
+            first = f"{number}. {about}: " if len(there) > 1 else "warning: "
             for warning in dict.fromkeys(warnings):
-                self.print(Text(f"warning: {warning}"), soft_wrap=True)
+                self.print(Text(f"{first}{warning}"), soft_wrap=True)
         self.found["warnings"] = {**self.found.get("warnings", {}), **there}
 
     def show(self) -> None:

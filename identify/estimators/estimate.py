@@ -19,7 +19,7 @@ from idbench.identify.estimators.solution import AbstractSolution, Given, OfWeig
 from idbench.identify.noise.propagation import NoiseLevels
 from idbench.identify.rows.factors import Factor, LeastSquaresFit, Status
 from idbench.identify.rows.rows import Rows
-from idbench.identify.tables import html_table, significant, text_table
+from idbench.identify.tables import concise, html_table, text_table
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -105,8 +105,8 @@ class Estimate:
         X, sigma = (x.reshape(-1, x.shape[-1])[0] for x in (self.X, self.standard_errors))
         of = f", the first of {self.X.size // max(self.X.shape[-1], 1)} runs" if several else ""
         units = self.problem.basis.units
-        rows = [[name, *significant(x, s), unit] for name, x, s, unit in zip(self.names, X, sigma, units, strict=True)]
-        return f"{len(self.names)} parameters{of}", ["", "value", "sigma", "unit"], rows
+        rows = [[name, concise(x, s), unit] for name, x, s, unit in zip(self.names, X, sigma, units, strict=True)]
+        return f"{len(self.names)} parameters{of}", ["", "value", "unit"], rows
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -58,7 +58,7 @@ def test_more_wrong_input_is_one_line(args, message, tmp_path, monkeypatch, comp
         ({"durations": [1.0]}, "23 waypoints need 22 durations, not 1"),
         ({"fs": 1e9}, "fs = 1e+09 Hz makes 4.6e+10 samples of this motion; 1 to 1e+08 are allowed"),
         ({"rest": 1.0}, "rest = 1 s is shorter than the 2.81 s that chain paper looks: raise it"),
-        ({"robot": "scora"}, "no robot 'scora'; known: horn, panda, pendulum, puma560, scara, servo_arm"),
+        ({"robot": "scora"}, "no robot 'scora'; known: horn, panda, pendulum, puma560, scara, servo_arm, two_link"),
     ],
 )
 def test_scenarios_that_make_no_sense_are_one_line(changes, message, tmp_path, complaint):

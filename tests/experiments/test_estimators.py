@@ -36,7 +36,9 @@ def test_a_run_knows_its_own_loop_and_says_whether_noise_in_W_matters(idbench, r
     assert rounds["simulations"] <= 5
     assert rounds["noise_in_W"]["matters"] is False
     assert len(rounds["path"][0]) == 8
-    code, out, _ = idbench("identify", ran, "--estimator", "DIDIM", "--start", "file", "--model", "explicit", "--no-rerun")
+    code, out, _ = idbench(
+        "identify", ran, "--estimator", "DIDIM", "--start", "file", "--model", "explicit", "--no-rerun", "-v"
+    )
     assert code == 0
     assert "explicit: converged after" in out
     assert "explicit: good" in out

@@ -33,10 +33,10 @@ def test_the_papers_chain_obeys_the_papers_rules():
 
 
 def test_identify_states_it(tmp_path, capsys):
-    assert main(["run", "ideal", "--no-rerun", "--out", str(tmp_path / "run")]) == 0
+    assert main(["run", "ideal", "--no-rerun", "-v", "--out", str(tmp_path / "run")]) == 0
     assert "wdyn 2.39 Hz (of the scenario's controller)" in capsys.readouterr().out
     log = str(tmp_path / "run" / "log.parquet")
-    assert main(["identify", log, "--torque", "held", "--wdyn", "2", "--no-rerun"]) == 0
+    assert main(["identify", log, "--torque", "held", "--wdyn", "2", "--no-rerun", "--verbose"]) == 0
     assert "wdyn 2 Hz (as stated); fs 50 wdyn" in capsys.readouterr().out
 
 

@@ -52,8 +52,8 @@ def test_a_view_that_fails_leaves_everything_else(view, error, idbench, logs, tm
     monkeypatch.setattr(view, error)
     code, out, err = idbench("identify", logs / "first.parquet", *WORDS, "--out", "found", "--write", "found/arm.json")
     assert code == 2
-    assert "Cond(W)" in out
-    assert "explicit: good" in out
+    assert "explicit model, WLS" in out
+    assert out.startswith("Result: good (explicit model)")
     assert len(err.splitlines()) == 1
     assert f"idbench: {name}: " in err
     assert "the estimates are printed, and with the logs in found" in err
@@ -102,7 +102,7 @@ def test_a_held_out_log_that_cannot_be_judged_leaves_the_others(error, idbench, 
     assert f"held-out log {names[1]}" in err
     judged = json.loads((tmp_path / "found" / "summary.json").read_text())["validations"]
     assert [bool(one["models"]) for one in judged] == [True, False, True]
-    assert out.count("explicit: good") == 2
+    assert out.count("\nheld-out log ") == 2
     assert (tmp_path / "found" / "report.html").is_file()
 
 
@@ -135,7 +135,7 @@ def test_results_are_saved_before_the_judgement(idbench, logs, tmp_path, monkeyp
     code, out, err = idbench("identify", logs / "first.parquet", *WORDS, "--out", "found")
     kept = "idbench: the estimates are printed, and with the logs in found"
     assert (code, err.strip().splitlines()) == (130, [kept, "idbench: interrupted"])
-    assert "Cond(W)" in out
+    assert "explicit model, WLS" in out
     summary = json.loads((tmp_path / "found" / "summary.json").read_text())
     assert summary["models"]["explicit"]["estimate"]
     assert (tmp_path / "found" / "log.parquet").is_file()
@@ -156,7 +156,7 @@ def test_a_screen_that_is_full_costs_no_view(logs, tmp_path):
 def test_a_run_without_a_recording_gets_no_layer(idbench, tmp_path):
     assert idbench("run", "ideal", "--no-rerun", "--out", "ran")[0] == 0
     code, out, err = idbench("identify", "ran", "--estimator", "WLS")
-    assert (code, err, "Cond(W)" in out) == (0, "", True)
+    assert (code, err, "explicit model, WLS" in out) == (0, "", True)
     code, out, err = idbench("identify", "ran", "--estimator", "WLS", "--label", "again")
     assert (code, out) == (2, "")
     assert "there is no recording.rrd in ran, to which --label again could add" in err
@@ -178,7 +178,7 @@ def test_a_full_disk_in_each_view(most, lost, kept, logs, tmp_path):
     code += f"from idbench.experiments.cli import main; sys.exit(main({words}))"
     done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 2
-    assert "Cond(W)" in done.stdout
+    assert "explicit model, WLS" in done.stdout
     assert len(done.stderr.splitlines()) == 1
     there = {path.name for path in (tmp_path / "found").glob("*")} if (tmp_path / "found").exists() else set()
     assert kept <= there
@@ -202,7 +202,7 @@ def test_a_disk_that_is_full_for_one_file_leaves_the_others(lost, idbench, logs,
         monkeypatch.setattr(Path, name, lambda path, *args, _write=write, **options: full(path, _write)(path, *args, **options))
     targets = ["--write", *(f"found/{name}" for name in WRITTEN)]
     code, out, err = idbench("identify", logs / "first.parquet", *WORDS, "--out", "found", *targets)
-    assert (code, len(err.splitlines()), "explicit: good" in out) == (2, 1, True)
+    assert (code, len(err.splitlines()), out.startswith("Result: good")) == (2, 1, True)
     assert "No space left on device" in err
     there = {path.name for path in (tmp_path / "found").iterdir()} - {NAME}
     gone = set(RECORDING) if lost == "recording.rrd" else {lost}

@@ -79,7 +79,9 @@ def test_armature_on_joint_2_is_refused(robot):
 
 
 def test_unknown_robot_lists_the_known():
-    with pytest.raises(RobotError, match=r"no robot 'scora'; known: horn, panda, pendulum, puma560, scara, servo_arm"):
+    with pytest.raises(
+        RobotError, match=r"no robot 'scora'; known: horn, panda, pendulum, puma560, scara, servo_arm, two_link"
+    ):
         Robot.load("scora")
 
 

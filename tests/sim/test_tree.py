@@ -138,7 +138,7 @@ def test_a_floating_base_is_held_and_joints_without_names_get_some(written):
 
 @pytest.mark.parametrize(
     ("name", "message"),
-    [("kuka", "no robot 'kuka'; known: horn, panda, pendulum, puma560, scara, servo_arm"), ("no.xml", "cannot read")],
+    [("kuka", "no robot 'kuka'; known: horn, panda, pendulum, puma560, scara, servo_arm, two_link"), ("no.xml", "cannot read")],
 )
 def test_robots_that_are_not_there(name, message):
     with pytest.raises(RobotError, match=message):

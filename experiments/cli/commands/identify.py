@@ -1,7 +1,7 @@
 """The command that identifies logs: request, logs, fit, judgement, printed and saved; then views, each of which may fail."""
 
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack, nullcontext
 from dataclasses import replace
 from pathlib import Path
@@ -28,7 +28,10 @@ from idbench.experiments.results.page import Page, new_page, shown, stages_of
 from idbench.experiments.results.writing import write_summary
 from idbench.identify.files.log_file import write_log
 
-LEFT_OUT = ("out", "force", "json", "watching", "write", "write_mjcf", "follow")
+COLORS = {"good": "green", "fair": "yellow", "poor": "red"}
+"""Of the verdicts."""
+
+LEFT_OUT = ("out", "force", "json", "watching", "write", "write_mjcf", "follow", "verbose")
 """Options that make no difference to an identification."""
 
 NOT_MADE_AGAIN = tuple(name for name in LEFT_OUT if name != "out")
@@ -50,26 +53,45 @@ def identify(options: Identify) -> None:
         options = _followed(stack, options, request, audience)
         with stages_of("identifying"):
             result = fit_of(*loaded_logs(with_own_parts(options), request))
-        _show_fit(page, result, options, read[0])
-        _save(folder, page, result)
+        whole_models = shown_whole(result, options.model is not None)
+        page.found |= {"experiment": "identify", "log": read[0].name, "path": str(read[0]), **summary_of(result)}
         kept = f"the estimates are printed{f', and with the logs in {folder.out}' if folder else ''}"
         with Attempts(kept, folder) as attempts:
-            judgement = attempts.attempt("the verdict", lambda: _judged(result, options))
+            try:
+                _save(folder, page, result)
+                judgement = attempts.attempt("the verdict", lambda: _judged(result, options))
+                warnings = {} if judgement is None else _checked(judgement, options, attempts)
+            except BaseException:  # whatever ends it, the estimates are worth keeping
+                _show_fit(page, result, options, whole_models)
+                raise
+            if judgement is not None:
+                _show_answer(page, judgement, warnings)
+            _show_fit(page, result, options, whole_models)
             if judgement is None:
                 return
-            _show_judgement(page, judgement, shown_whole(result, options.model is not None))
+            for one in judgement.on:
+                print_held_out(page, one, whole_models, verbose=options.verbose)
+            page.found |= judgement.summary()
             for log in judgement.failures:
                 attempts.failed(log.title, log.why, log.traceback)
-            with stages_of("checking"):
-                delay = sought_of(options.torque_delay) is None
-                warnings = (
-                    attempts.attempt("the checks", lambda: checks(judgement, delay=delay, trials=not options.no_trials)) or {}
-                )
             page.warn(warnings)
-            page.print(Text(conclusion(judgement, warnings), style="bold"), soft_wrap=True)
             attempts.attempt("summary.json", lambda: _save(folder, page))
             page.end()
             view_all(Shown(page, options, command, judgement, warnings, folder, audience), attempts)
+
+
+def _checked(judgement: Judgement, options: Identify, attempts: Attempts) -> Mapping[str, Sequence[str]]:
+    """Return what to check first."""
+    with stages_of("checking"):
+        delay = sought_of(options.torque_delay) is None
+        return attempts.attempt("the checks", lambda: checks(judgement, delay=delay, trials=not options.no_trials)) or {}
+
+
+def _show_answer(page: Page, judgement: Judgement, warnings: Mapping[str, Sequence[str]]) -> None:
+    """Show the verdict, and what to do next."""
+    verdict, step = conclusion(judgement, warnings)
+    page.print(Text(verdict, f"bold {COLORS.get(verdict.split()[1], '')}".strip()), soft_wrap=True)
+    page.print(Text(f"{step}\n", "bold"), soft_wrap=True)
 
 
 def _judged(result: Fit, options: Identify) -> Judgement:
@@ -91,21 +113,12 @@ def _followed(stack: ExitStack, options: Identify, request: Request, audience: A
     return replace(options, log=(follower.complete(Path(folder)),))
 
 
-def _show_fit(page: Page, result: Fit, options: Identify, log: Path) -> None:
+def _show_fit(page: Page, result: Fit, options: Identify, whole: tuple[str, ...]) -> None:
     """Show the estimates."""
-    print_fit(page, result, ", ".join(map(str, options.log)), shown_whole(result, options.model is not None))
+    print_fit(page, result, ", ".join(map(str, options.log)), whole, verbose=options.verbose)
     for note in notes_of(result):
         page.print(Text(note), soft_wrap=True)
     page.show()
-    page.found |= {"experiment": "identify", "log": log.name, "path": str(log), **summary_of(result)}
-
-
-def _show_judgement(page: Page, judgement: Judgement, whole: Sequence[str]) -> None:
-    """Show verdicts on the held-out logs."""
-    for one in judgement.on:
-        print_held_out(page, one, whole)
-    page.show()
-    page.found |= judgement.summary()
 
 
 def _save(folder: ResultsFolder | None, page: Page, result: Fit | None = None) -> None:

@@ -24,7 +24,7 @@ from idbench.identify.files.log_file import write_log
 from idbench.sim.drives import ServoDrive
 from idbench.sim.scenario.scenario import Scenario
 
-LEFT_OUT = ("out", "force", "json", "watching", "yes")
+LEFT_OUT = ("out", "force", "json", "watching", "yes", "verbose")
 """Options that make no difference to a run's results."""
 
 
@@ -45,7 +45,7 @@ def run(options: RunCommand) -> None:
             watch = recording.watch if recording else None
             ran = replace(made, progress=lambda share: told(f"simulating, {share:.0%}", share), watch=watch)
             _ = ran.fit
-        _print_run(page, ran)
+        _print_run(page, ran, verbose=options.verbose)
         if isinstance(ran.scenario.drive, ServoDrive):
             page.print(Text(_as_servos(ran.scenario, folder.out)), soft_wrap=True)
         with saved(page, folder, ran.summary(), _files(ran), watching.hint(folder.out)) as attempts:
@@ -74,9 +74,10 @@ def _as_servos(scenario: Scenario, out: Path) -> str:
     return f"the torque above is that of the motors' currents; from commands and positions alone: uv run idbench servo {words}"
 
 
-def _print_run(page: Page, ran: ScenarioRun) -> None:
-    """Print the estimates, and what to check."""
-    print_fit(page, ran.fit, f"Scenario {ran.scenario.name}", shown_whole(ran.fit, asked=False))
+def _print_run(page: Page, ran: ScenarioRun, *, verbose: bool) -> None:
+    """Print the estimates, of the paper's robot those of all models, and what to check."""
+    whole = shown_whole(ran.fit, asked=ran.scenario.robot == "scara")
+    print_fit(page, ran.fit, f"Scenario {ran.scenario.name}", whole, verbose=verbose)
     if ran.rejection is not None:
         page.print(Text(ran.rejection.words(ran.run.robots[0].joints, ran.scenario.wdyn)), soft_wrap=True)
     of_log = warnings_of_log(ran.run.alone(), ran.fit.robot_model.tree)

@@ -8,7 +8,7 @@ from idbench.experiments.cli.app import command
 from idbench.experiments.cli.command import Command
 from idbench.experiments.recording.audience import Watching
 from idbench.experiments.requests import jobs
-from idbench.experiments.requests.words import File, Files, Folder, Json, Seconds, Window
+from idbench.experiments.requests.words import File, Files, Folder, Json, Seconds, Verbose, Window
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,6 +43,8 @@ class RunCommand(jobs.RunRequest, RecordedOptions, Command, action="run:run"):
     """Interval [s] in which signals inside the control loop are recorded at the full rate of the drive, such as 10 10.5."""
     yes: bool = False
     """Allow more than a thousand million physics steps."""
+    verbose: Verbose = False
+    """Print details, too: noise, Cond(W), correlations, intervals, iterations."""
 
 
 @command("identify")
@@ -53,9 +55,12 @@ class Identify(jobs.IdentifyRequest, RecordedOptions, Command, action="identify:
 
     essential: ClassVar[tuple[str, ...]] = (
         "log", "robot", "torque", "torque_delay", "friction", "armature", "resample", "estimator", "validate", "write", "out",
+        "verbose",
     )  # fmt: skip
     """Options of the short help."""
 
+    verbose: Verbose = False
+    """Print details, too: noise, Cond(W), correlations, intervals, iterations."""
     follow: Seconds = None
     """Identify a CSV log while it is being written, until it has not grown for this time, then as a whole. --live or --serve
     show estimates and residuals as they develop."""

@@ -148,8 +148,8 @@ def test_the_table_and_the_chart_of_parameters_tell_the_errors(recorded):
     found, names = recorded.ran.fit, recorded.ran.fit.basis.names
     table = static(recorded, "report", "TextDocument:text")[0]
     truth = np.array(list(found.truth.values()))
-    for name, true in found.truth.items():
-        assert f"{name} | {true:g} |" in table
+    for (name, true), unit in zip(found.truth.items(), found.basis.units, strict=True):
+        assert f"{name} | {unit} | {true:g} |" in table
     labels = static(recorded, "parameters/00/all/ticks_y", "LineStrips2D:labels")
     assert [label.split()[0] for label in labels] == list(names)
     unit = found.estimates["explicit"].standard_errors
