@@ -74,7 +74,8 @@ class Rows:
     @classmethod
     def of(cls, equations: Equations, to_rows: RowMap) -> Self:
         """Return the rows that a map makes of a model's equations; raise SettingError where its columns are not finite."""
-        n, p, count = equations.kinds, len(equations.names), to_rows.grid.count
+        n, p = equations.kinds, len(equations.names)
+        count = to_rows.grid.count
         y = to_rows.kernel.apply(to_rows.inside * equations.y) * to_rows.outside
         W = np.zeros((*y.shape[:-2], count, n, p))
         # Of each run, however many there are: other stretches might have other bits.

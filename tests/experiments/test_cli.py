@@ -5,6 +5,7 @@ import json
 import pytest
 
 from idbench.experiments.cli import main
+from idbench.experiments.cli.app import COMMANDS
 from idbench.experiments.paper.table1 import SCENARIO
 from idbench.experiments.results.writing import NAME as MANIFEST
 from idbench.identify.files.log_file import read_log
@@ -104,3 +105,11 @@ def test_a_reader_that_goes_away_is_no_error(tmp_path, start):
     process.stdout.close()
     assert process.stderr.read() == ""
     assert process.wait() == 0
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_shells_complete_every_command_and_its_options(shell, capsys):
+    assert main(["completion", shell]) == 0
+    script = capsys.readouterr().out
+    assert all(f'"{name}"' in script for name in COMMANDS)
+    assert "--torque-delay" in script

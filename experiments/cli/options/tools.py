@@ -170,6 +170,19 @@ class Check(Command, action="authors:check"):
     """Print the checks and their results as JSON; human-readable text goes to the error stream."""
 
 
+@command("completion")
+@final
+@dataclass(frozen=True)
+class Completion(Command, action="completion:complete"):
+    """Print a script for a shell, which then completes commands and options with the tab key.
+
+    bash: idbench completion bash > ~/.local/share/bash-completion/completions/idbench
+    """
+
+    shell: Annotated[Literal["bash", "zsh", "fish"], Word(positional=True)]
+    """The shell."""
+
+
 @command("list")
 @final
 @dataclass(frozen=True)
