@@ -181,7 +181,7 @@ def percent(share: float) -> str:
 
 def percentage(x: float) -> str:
     """Return a percentage without a sign, to two digits; empty if it is not known."""
-    return f"{x:.2g}" if x < 100 else f"{x:.0f}" if x < WORTHLESS else f">{WORTHLESS:g}" if x >= WORTHLESS else ""
+    return f"{x:.2g}" if x < 99.5 else f"{x:.0f}" if x < WORTHLESS else f">{WORTHLESS:g}" if x >= WORTHLESS else ""
 
 
 def probability(p: float) -> str:

@@ -15,12 +15,6 @@ from mkdocs.structure.files import File, Files
 
 ROOT = Path(__file__).parent.parent.parent
 
-COMMANDS = (
-    *("run", "view", "identify", "table1", "table2", "log", "robot", "excite", "payload", "gains", "servo", "study"),
-    *("scenario", "new", "check", "list", "resample", "export", "search"),
-)
-"""In the order in which people meet them."""
-
 KINDS_OF_NAMES = (
     ("Logs", ("MotionLog", "TorqueChannel", "encoder_steps", "smoothed_log")),
     ("Robots", ("scara", "tree_basis", "Basis", "Parameter", "KinematicTree", "Joint", "BaseParameters")),
@@ -35,7 +29,8 @@ def on_files(files: Files, config: Any) -> Files:
     from site_recordings import recordings
 
     made = {"reference/commands.md": commands(), "reference/settings.md": "\n".join(settings())}
-    made |= {"reference/names.md": "\n".join([*session(), *package("identify"), *simulator()])}
+    made |= {"reference/session.md": "\n".join(session())}
+    made |= {"reference/identify.md": "\n".join(package("identify")), "reference/sim.md": "\n".join(simulator())}
     made |= notebook_pages()
     for path, text in made.items():
         files.append(File.generated(config, path, content=text))
@@ -52,6 +47,8 @@ def viewer_files() -> dict[str, Path]:
 
 def commands() -> str:
     """Return what every command says of itself."""
+    from idbench.experiments.cli.app import COMMANDS
+
     pages = ["# Commands\n\n`idbench COMMAND --help-all`, as it is printed. `uv run idbench` runs it from a clone.\n"]
     helps = {name: _help(name) for name in COMMANDS}
     pages[0] += "\n| command | what it does |\n|---|---|\n"
@@ -137,7 +134,7 @@ def package(name: str) -> Iterator[str]:
 
     named = {key: value for key, value in vars(identify).items() if not key.startswith("_")}
     public = [key for key, value in named.items() if not isinstance(value, ModuleType)]
-    yield f"# {name}\n\nWhat `from idbench.{name} import ...` has, and [what of sim](#sim). Shapes and units are in [ ]."
+    yield f"# {name}\n\nWhat `from idbench.{name} import ...` has, and [what of sim](sim.md). Shapes and units are in [ ]."
     yield "Equation numbers are the paper's.\n"
     taken = set[str]()
     for title, names in KINDS_OF_NAMES:

@@ -3,7 +3,8 @@
 import os
 import sys
 from collections.abc import Callable, Sequence
-from contextlib import suppress
+from contextlib import redirect_stdout, suppress
+from io import StringIO
 
 import tyro
 from tyro.extras import SubcommandApp
@@ -103,10 +104,23 @@ def _parsed(words: list[str]) -> object:
     """Return what the library makes of words; the list of all commands needs nothing of their options."""
     if words[0] in COMMANDS:
         return tyro.cli(typed(COMMANDS[words[0]]), prog=f"idbench {words[0]}", args=words[1:])
-    all_ = SubcommandApp()
+    return _together().cli(prog="idbench", description=DESCRIPTION, args=words)
+
+
+def _together() -> SubcommandApp:
+    """Return all commands as one."""
+    every = SubcommandApp()
     for name, options in COMMANDS.items():
-        all_.command(name=name)(options)
-    return all_.cli(prog="idbench", description=DESCRIPTION, args=words)
+        every.command(name=name)(options)
+    return every
+
+
+def completion(shell: str) -> str:
+    """Return the script that lets bash, zsh or fish complete commands and options."""
+    script = StringIO()
+    with redirect_stdout(script), suppress(SystemExit):  # the parser ends its process after the script
+        _together().cli(prog="idbench", args=["--tyro-print-completion", shell])
+    return script.getvalue()
 
 
 def command(name: str) -> Callable[[type], type]:

@@ -9,7 +9,7 @@ import tomli_w
 
 from idbench.experiments.exports.ensemble import DRAWS, LENGTH, Ensemble, FreeRuns
 from idbench.experiments.identification.robot_model import RobotModel
-from idbench.experiments.reports.panels import Panel, figure
+from idbench.experiments.reports.panels import Panel, stacked
 from idbench.identify import Array
 from idbench.sim.robot.tree import standard_parameters
 from idbench.sim.robot.varied import model_fields
@@ -55,7 +55,7 @@ def picture(runs: FreeRuns, robot_model: RobotModel) -> str:
         panel.line(np.array([0.0, LENGTH * count]), np.zeros(2), "#444444", 1.0, "log")
         panels.append(panel)
     units = {robot_model.units(j)[1] for j in range(robot_model.robot.n)}
-    return figure(panels, 1.5, "time of free runs [s]", f"robots - log [{', '.join(sorted(units))}]")
+    return stacked(panels, 1.5, "time of free runs [s]", f"robots - log [{', '.join(sorted(units))}]")
 
 
 def ranges(ensemble: Ensemble) -> dict[str, Any]:

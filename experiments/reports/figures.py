@@ -12,7 +12,7 @@ from idbench.experiments.identification.fit import Fit
 from idbench.experiments.judgement.held_out import HeldOut
 from idbench.experiments.reports.friction_curves import FRICTIONS, WHOLE, FrictionCurves, left_over, spectra
 from idbench.experiments.reports.panels import Panel, PanelAxis, figure
-from idbench.experiments.text import SIGMAS, model_color, percentage
+from idbench.experiments.text import model_color, percentage
 from idbench.identify import Array, cutoffs
 from idbench.identify.arrays import TINY
 from idbench.identify.rows.rows import Rows
@@ -31,12 +31,6 @@ def _text(package: str, name: str) -> str:
 NOISES = {"torque noise": ("#808080", "5 3"), "position noise": ("#8c564b", "1.5 3")}
 """How the noise that was found is drawn: color, dashes."""
 
-ACROSS = 30
-"""Names of parameters that have room beside each other."""
-
-OUTSIDE = 1e6
-"""Per cent of a parameter's value beyond which it is drawn no farther: a friction that was moved to zero has none."""
-
 
 def torques_figure(one: HeldOut) -> str:
     """Return measured and predicted torques on a held-out log, joint by joint."""
@@ -49,7 +43,7 @@ def torques_figure(one: HeldOut) -> str:
         panel.line(rows.time[own], np.where(rows.valid[own], rows.Y[own], np.nan), "#8c8c8c", 2.4, "measured")
         for model in reversed(models):
             predicted = rows.predicted(one.fit.estimates[model].X)
-            panel.line(rows.time[own], np.where(rows.valid[own], predicted[own], np.nan), _color(model), 1.0, model)
+            panel.line(rows.time[own], np.where(rows.valid[own], predicted[own], np.nan), color_of(model), 1.0, model)
         panels.append(panel)
     return figure(panels, 1.5, "time [s]", f"torque [{_units(one.fit)[0]}]")
 
@@ -61,7 +55,7 @@ def residuals_figure(one: HeldOut) -> str:
     residual = rows.Y - rows.predicted(one.fit.estimates[model].X)
     for j, joint in enumerate(one.fit.robot_model.robot.joints):
         own, panel = rows.group == j, Panel(joint)
-        panel.line(rows.time[own], np.where(rows.valid[own], residual[own], np.nan), _color(model), 0.8)
+        panel.line(rows.time[own], np.where(rows.valid[own], residual[own], np.nan), color_of(model), 0.8)
         panels.append(panel)
     return figure(panels, 1.35, "time [s]", f"residual [{_units(one.fit)[0]}]")
 
@@ -78,10 +72,10 @@ def causes_figure(fit: Fit) -> str:
         time = np.arange(np.count_nonzero(own)) * np.median(np.diff(rows.time[own]))  # of several logs, one after the other
         shown = fit.robot_model.robot.joints[int(rows.group[own][0])]
         panel = Panel(f"{shown}: {cause.short}{f', of {cause.joint}' if cause.joint not in (None, shown) else ''}")
-        for values, color, label in ((residual, "#999999", "residual of the fit"), (explained, _color("power"), "explained")):
+        for values, color, label in ((residual, "#999999", "residual of the fit"), (explained, color_of("power"), "explained")):
             panel.line(time, np.where(rows.valid[own], values[own], np.nan), color, 1.2, label)
         panels.append(panel)
-    return figure(panels, 1.6, "time [s]", f"[{_units(fit)[0]}]", columns=1)
+    return figure(panels, 1.6, "time [s]", f"[{_units(fit)[0]}]")
 
 
 def _most_explained(rows: Rows, cause: Cause) -> tuple[npt.NDArray[np.bool_], Array]:
@@ -90,37 +84,6 @@ def _most_explained(rows: Rows, cause: Cause) -> tuple[npt.NDArray[np.bool_], Ar
     assert explained is not None
     squares, of_all = (np.sum(rows.by_kind(x * rows.valid) ** 2, axis=-1) for x in (explained, rows.Y))
     return rows.group == int(np.argmax(squares / np.maximum(of_all, TINY))), explained
-
-
-def _share(x: Array, size: Array) -> Array:
-    """Return x in per cent of a size, far outside of the picture where that is next to nothing."""
-    return np.clip(100 * x / size, -OUTSIDE, OUTSIDE)
-
-
-def parameters_figure(fit: Fit) -> str:
-    """Return estimates with intervals, over the size of each: those of the first model, and how others differ."""
-    shown = fit.basis.without_random_effects
-    lines = -(-len(shown) // ACROSS)  # names that would run together go on in another panel
-    panels = [_parameters_panel(fit, members) for members in np.array_split(np.array(shown), lines)]
-    return figure(panels, 2.4, "", f"difference from {next(iter(fit.estimates))}, 95 % [%]", columns=1)
-
-
-def _parameters_panel(fit: Fit, members: npt.NDArray[np.intp]) -> Panel:
-    names, models = [fit.basis.names[p] for p in members], list(fit.estimates)
-    leading = fit.estimates[models[0]].X[members]
-    size = np.maximum(np.abs(leading), 1e-300)
-    at = np.arange(len(names), dtype=np.float64)
-    ticks = {x: f"{x:g}" for x in (-100.0, -10.0, -1.0, 0.0, 1.0, 10.0, 100.0)}
-    beside = PanelAxis(limits=(-1, len(names)), ticks=dict(zip(at.tolist(), names, strict=True)))
-    panel = Panel("", beside, PanelAxis(linear=1.0, limits=(-300, 300), ticks=ticks))
-    for i, model in enumerate(models):
-        estimate = fit.estimates[model]
-        off, half = _share(estimate.X[members] - leading, size), _share(SIGMAS * estimate.standard_errors[members], size)
-        panel.intervals(at + 0.22 * (i - (len(models) - 1) / 2), off, half, _color(model), model)
-    if fit.truth is not None:
-        true = np.array(list(fit.truth.values()))[members]
-        panel.across(at, _share(true - leading, size), "black", "true")
-    return panel
 
 
 def friction_figure(fit: Fit) -> str:
@@ -140,8 +103,8 @@ def friction_figure(fit: Fit) -> str:
         for number, line in enumerate(curves.laws(j)):
             inside = np.abs(line.v) <= np.abs(v).max(initial=0.0)
             labels = ("", "") if number else ("estimated law", "beyond the speeds of the log")
-            panel.line(line.v, np.where(inside, line.torque, np.nan), _color("explicit"), 1.6, labels[0])
-            panel.line(line.v, np.where(inside, np.nan, line.torque), _color("power"), 1.6, labels[1], "2 3")
+            panel.line(line.v, np.where(inside, line.torque, np.nan), color_of("explicit"), 1.6, labels[0])
+            panel.line(line.v, np.where(inside, np.nan, line.torque), color_of("power"), 1.6, labels[1], "2 3")
         panels.append(panel)
     force, velocity = _units(fit)
     return figure(panels, 1.6, f"velocity [{velocity}]", f"friction [{force}]")
@@ -158,7 +121,7 @@ def spectra_figure(fit: Fit) -> str:
             f"{found.row} [{found.unit}/\u221aHz]", PanelAxis(log=True), PanelAxis(log=True, limits=(top * 1e-5, top * 3))
         )
         for name, density in found.lines.items():
-            color, dash = NOISES.get(name, (_color(form), ""))
+            color, dash = NOISES.get(name, (color_of(form), ""))
             panel.line(found.f, density, color, 1.0, "residual" if name == form else name, dash)
         for cutoff in cutoffs(fit.processing, fit.logs.fitted[0].fs).values():
             panel.line(np.array([cutoff, cutoff]), np.array([top * 1e-5, top * 3]), "#cccccc")
@@ -172,5 +135,6 @@ def _units(fit: Fit) -> tuple[str, str]:
     return ", ".join(dict.fromkeys(force for force, _ in each)), ", ".join(dict.fromkeys(f"{way}/s" for _, way in each))
 
 
-def _color(model: str) -> str:
+def color_of(model: str) -> str:
+    """Return the colour of a model for pages."""
     return "#{:02x}{:02x}{:02x}".format(*model_color(model)[:3])

@@ -1,26 +1,37 @@
 """The report of an identification: one HTML file that needs no other."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from datetime import date
 from importlib.metadata import version
+from itertools import groupby
+from math import isfinite
 from typing import Any, TypeVar
+
+import numpy as np
 
 from idbench.experiments.identification.fit import Fit
 from idbench.experiments.judgement.held_out import HeldOut
 from idbench.experiments.judgement.judgement import Judgement, Unjudged
-from idbench.experiments.reports.estimates import EstimatesTable
+from idbench.experiments.judgement.warnings import FLAGS, doubtful, used
+from idbench.experiments.reports.estimates import conclusion, leading
 from idbench.experiments.reports.figures import (
     causes_figure,
+    color_of,
     friction_figure,
-    parameters_figure,
     rendered,
     residuals_figure,
     spectra_figure,
     torques_figure,
 )
+from idbench.experiments.reports.intervals import parameter_rows
+from idbench.experiments.reports.uncertainty import correlated, error_shares
 from idbench.experiments.results.attempts import Attempts
 from idbench.experiments.text import percentage
 
 T = TypeVar("T")
+
+LONGEST = 20
+"""Correlations that are listed, the strongest ones."""
 
 
 def report(
@@ -31,8 +42,10 @@ def report(
     A figure that fails is noted in `attempts`, and missing.
     """
     fit, hardest = judgement.fit, judgement.hardest
-    table = EstimatesTable(fit)
     robot_model = fit.robot_model
+    rows = list(parameter_rows(fit))
+    marks, lead = doubtful(fit), fit.estimates[fit.leading]
+    verdict, step = conclusion(judgement, warnings)
     cutoff = getattr(fit.processing.operator, "cutoff", None)
     return rendered(
         "idbench.experiments.reports",
@@ -45,10 +58,19 @@ def report(
         warnings={about: messages for about, messages in warnings.items() if messages},
         causes=_figure(attempts, "causes", causes_figure, fit),
         unseen=[_held_out(one, attempts) for one in judgement.held_out],
-        parameters=_figure(attempts, "parameters", parameters_figure, fit),
-        parameter_heads=[" ".join(head) for head in table.heads],
-        parameter_rows=list(_parameters(fit, table)),
-        legend=table.legend,
+        verdict=verdict,
+        word=verdict.split()[1] if hardest else "unsure",
+        step=step,
+        models=[(model, color_of(model)) for model in fit.estimates],
+        leading=fit.leading,
+        filed="true value" if fit.truth else "robot's file",
+        parameters=[(link, list(each)) for link, each in groupby(rows, lambda row: row.link)],
+        legend="; ".join(f"{flag} {FLAGS[flag]}" for flag in used({fit.leading: marks[fit.leading]})),
+        correlated=correlated(lead)[:LONGEST],
+        limits=[(cause, percentage(share), name, percentage(most)) for cause, share, name, most in error_shares(lead)],
+        torque_limits=[] if hardest is None else list(_torque_errors(hardest)),
+        ranges=list(_ranges(fit)),
+        today=date.today().isoformat(),
         friction=_figure(attempts, "friction", friction_figure, fit),
         spectra=_figure(attempts, "spectra", spectra_figure, fit),
         joints=robot_model.robot.joints,
@@ -89,11 +111,25 @@ def _held_out(one: HeldOut, attempts: Attempts) -> tuple[str, str, str, list[str
     return one.title, *figures, heads, rows
 
 
-def _parameters(fit: Fit, table: EstimatesTable) -> Iterator[list[str]]:
-    made = fit.robot_model.grouping.groupings
-    units = dict(zip(fit.basis.names, fit.basis.units, strict=True))
-    for name, *cells in table.rows():
-        yield [f"{name} [{units[name]}]", *cells, made[name]]
+def _torque_errors(one: HeldOut) -> Iterator[list[str]]:
+    """Yield, of each joint, the rms torque error on a held-out log, and what of it is noise, sigma, the model."""
+    found = one.torques[leading({model: validation.rms for model, validation in one.torques.items()})]
+    for j, joint in enumerate(one.fit.robot_model.robot.joints):
+        parts = (found.rms[j], found.noise[j], found.open[j], found.excess[j])
+        unit = one.fit.robot_model.units(j)[0]
+        yield [joint, unit, *(f"{x:.2g}" if isfinite(x) else "" for x in parts), percentage(found.percent[j])]
+
+
+def _ranges(fit: Fit) -> Iterator[list[str]]:
+    """Yield the largest speeds, accelerations and torques of the fitted logs, by joint: where the result holds."""
+    states = [signals.state for signals in fit.problem.signals]
+    largest = np.array([np.max([np.abs(x).max(axis=-1) for x in each], axis=0) for each in (
+        [state.qd for state in states], [state.qdd for state in states], [log.tau.T for log in fit.logs.fitted],
+    )])  # fmt: skip
+    for j, joint in enumerate(fit.robot_model.robot.joints):
+        torque, position = fit.robot_model.units(j)
+        each = zip(largest[:, j], (f"{position}/s", f"{position}/s^2", torque), strict=True)
+        yield [joint, *(f"{x:.3g} {unit}" for x, unit in each)]
 
 
 def _logs(fit: Fit) -> Iterator[list[Any]]:

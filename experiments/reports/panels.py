@@ -10,32 +10,26 @@ import numpy as np
 
 from idbench.identify import Array
 
-WIDTH = 1056.0
-"""Of a figure [px]."""
+WIDTH = 520.0
+"""Of a panel [px]: two beside each other on a page, one on a telephone."""
 
 ROW = 96.0
 """An inch of a panel's height [px]."""
 
-LEFT = 62.0
-"""Room beside the panels for numbers [px]."""
+LEFT = 46.0
+"""Room beside a panel for numbers [px]."""
 
 RIGHT = 8.0
 """Room at their other end [px]."""
 
-TOP = 24.0
-"""Room for the legend [px]."""
+TOP = 20.0
+"""Room for the title [px]."""
 
-BOTTOM = 34.0
-"""Room below the last panels [px]."""
-
-BETWEEN = 66.0
-"""Room between panels beside each other [px]."""
+BOTTOM = 20.0
+"""Room for numbers below a panel [px]."""
 
 ABOVE = 30.0
-"""Room between panels above each other [px]."""
-
-FEW = 2
-"""Panels from which on they stand in two columns."""
+"""What an inch of a panel's height has for title and numbers [px]."""
 
 FINE = 2
 """Columns of curves for a pixel of a panel, so that a browser can enlarge them: each has its least and its largest sample."""
@@ -129,39 +123,66 @@ class Panel:
             label = ""
 
 
-def figure(panels: Sequence[Panel], height: float, x: str = "", y: str = "", columns: int = 0) -> str:
-    """Return panels as SVG.
+def figure(panels: Sequence[Panel], height: float, x: str = "", y: str = "") -> str:
+    """Return panels as SVG, one picture each: a page puts as many beside each other as it is wide.
 
     Parameters
     ----------
     panels : sequence of Panel
-        In two columns if there are many and no number of columns is given.
+        One for each joint, or each mistake.
     height : float
         Of a panel [inch].
     x, y : str
         What the axes are.
-    columns : int
-        How many panels stand beside each other.
     """
-    columns = columns or (2 if len(panels) > FEW else 1)
-    wide = (WIDTH - LEFT - RIGHT - BETWEEN * (columns - 1)) / columns
-    high = height * ROW - ABOVE
-    lines = ceil(len(panels) / columns)
-    upright = any(panel.x.ticks and len(panel.x.ticks) > UPRIGHT for panel in panels)
-    above = ABOVE + (NAMES if upright else 0)
-    bottom = above + BOTTOM - ABOVE
-    whole = TOP + lines * (high + above) + BOTTOM
-    parts = [f'<svg class="curves" xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH:g} {whole:.0f}" font-size="10">']
-    for k, panel in enumerate(panels):
-        at = LEFT + (k % columns) * (wide + BETWEEN), TOP + (k // columns) * (high + above) + ABOVE - 12
-        parts += _panel(panel, at, (wide, high), upright)
-        if k >= len(panels) - columns:
-            parts.append(_text(at[0] + wide / 2, at[1] + high + bottom - 8, x, "middle"))
-        if k % columns == 0 and y:
-            middle = at[1] + high / 2
-            parts.append(_text(at[0] - 50, middle, y, "middle", f' transform="rotate(-90 {at[0] - 50:.0f} {middle:.0f})"'))
-    return "\n".join([*parts, *_legend(panels), "</svg>"])
+    size, drawn = _all(panels, height, WIDTH)
+    each = [
+        f'<svg class="curves" xmlns="{SVG}" viewBox="0 0 {size[0]:.0f} {size[1]:.0f}" font-size="11">{one}</svg>'
+        for one in drawn
+    ]
+    words = [f"<span>{escape(_axes(x, y))}</span>"]
+    for kind, color, label in _labels(panels):
+        words.append(f'<span><i class="{kind.split()[0]}" style="background:{color}"></i>{escape(label)}</span>')
+    return "\n".join([f'<div class="legend">{" ".join(words)}</div><div class="panels">', *each, "</div>"])
 
+
+def stacked(panels: Sequence[Panel], height: float, x: str = "", y: str = "") -> str:
+    """Return panels below each other as one SVG, for a file of its own; parameters as of `figure`."""
+    size, drawn = _all(panels, height, 2 * WIDTH)
+    whole = HEAD + len(panels) * size[1]
+    parts = [f'<svg xmlns="{SVG}" viewBox="0 0 {size[0]:.0f} {whole:.0f}" font-size="11" font-family="sans-serif">']
+    parts.append(_text(LEFT, 13, _axes(x, y)))
+    at = size[0]
+    for kind, color, label in reversed(_labels(panels)):
+        at -= 6.5 * len(label) + 30
+        width, length = (5, 0) if kind == "dots" else (2, 14)
+        parts.append(f'<path d="M{at:.0f},9h{length}" stroke="{color}" stroke-width="{width}" stroke-linecap="round"/>')
+        parts.append(_text(at + 20, 13, label))
+    parts += [f'<g transform="translate(0 {HEAD + k * size[1]:.0f})">{one}</g>' for k, one in enumerate(drawn)]
+    return "\n".join([*parts, "</svg>"])
+
+
+def _all(panels: Sequence[Panel], height: float, wide: float) -> tuple[tuple[float, float], list[str]]:
+    """Return the size of each panel [px], and their elements."""
+    upright = any(panel.x.ticks and len(panel.x.ticks) > UPRIGHT for panel in panels)
+    inner = wide - LEFT - RIGHT, height * ROW - ABOVE
+    drawn = ["\n".join(_panel(panel, (LEFT, TOP), inner, upright)) for panel in panels]
+    return (wide, TOP + inner[1] + BOTTOM + (NAMES if upright else 0)), drawn
+
+
+def _axes(x: str, y: str) -> str:
+    return f"{y} over {x}" if x and y else x or y
+
+
+def _labels(panels: Sequence[Panel]) -> list[tuple[str, str, str]]:
+    """Return kind, color and label of what the first panel shows."""
+    return [(kind, color, label) for kind, _, _, color, _, label in (panels[0].drawn if panels else ()) if label]
+
+
+HEAD = 20.0
+"""Room for the legend of a picture [px]."""
+
+SVG = "http://www.w3.org/2000/svg"
 
 UPRIGHT, NAMES = 18, 30.0
 """Names of an axis from which on they stand upright, and their room [px]."""
@@ -240,15 +261,3 @@ def _thinned(x: Array, y: Array, columns: int) -> tuple[Array, Array]:
     places = np.stack([low, high], axis=1) + every * np.arange(count)[:, None]
     kept = np.unique(places.ravel())
     return x[kept], y[kept]
-
-
-def _legend(panels: Sequence[Panel]) -> Iterator[str]:
-    """Yield the labels of the first panel, from the right."""
-    at = WIDTH - RIGHT
-    for kind, _, _, color, _, label in reversed([drawn for drawn in panels[0].drawn if drawn[-1]] if panels else []):
-        at -= 6.0 * len(label) + 8
-        yield _text(at, 11, label)
-        at -= 20
-        shape, width = ("h0", 5) if kind == "dots" else ("h14", 2)
-        yield f'<path d="M{at:.0f},8{shape}" stroke="{color}" stroke-width="{width}" stroke-linecap="round"/>'
-        at -= 10

@@ -49,6 +49,23 @@ def words_of_uncertainty(fit: Fit) -> Iterator[str]:
         )
 
 
+def error_shares(estimate: Estimate) -> Iterator[tuple[str, float, str, float]]:
+    """Yield what the variances of the parameters consist of: cause, median share [%], the parameter with most of it, its share.
+
+    var X = noise + delay + model + what changes from log to log
+    """
+    total = np.maximum(estimate.standard_errors**2, 1e-300)
+    delay, error = np.diagonal(estimate.delay_covariance), estimate.model_error
+    parts = {"noise of the logs": estimate.noise_sigma**2 - delay, "delay of the torques": delay}
+    if error is not None:
+        parts["what the model misses"] = np.diagonal(np.broadcast_to(error.covariance, estimate.covariance.shape))
+        parts["change from log to log"] = np.broadcast_to(error.scatter, total.shape)
+    for cause, variance in parts.items():
+        share = 100 * variance / total
+        most = int(np.nanargmax(share))
+        yield cause, float(np.nanmedian(share)), estimate.names[most], float(share[most])
+
+
 def correlated(estimate: Estimate) -> list[tuple[str, str, float]]:
     """Return the pairs of parameters, or of a parameter and the delay, that are strongly correlated, the strongest first."""
     C = estimate.within_covariance

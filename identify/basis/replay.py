@@ -74,7 +74,8 @@ class Program(Generic[Key]):
         self._columns = {key: places[x.number] if isinstance(x, Symbol) else x for key, x in columns.items()}
         self._scratch, kept = 0, len(places)
         last = {number: step for step in needed for number in tape.taken(step)}
-        free, constants, steps = list[int](), dict[float, int](), list[tuple[Any, list[int | float], int]]()
+        free, constants = list[int](), dict[float, int]()
+        steps = list[tuple[Any, list[int | float], int]]()
         for number in needed:
             operation, *taken = tape.steps[number]
             if number in self._signals:

@@ -111,5 +111,5 @@ def test_a_reader_that_goes_away_is_no_error(tmp_path, start):
 def test_shells_complete_every_command_and_its_options(shell, capsys):
     assert main(["completion", shell]) == 0
     script = capsys.readouterr().out
-    assert all(f'"{name}"' in script for name in COMMANDS)
+    assert all(f"'{name}'" in script for name in COMMANDS)
     assert "--torque-delay" in script

@@ -34,7 +34,7 @@ def test_a_wrong_torque_constant_is_named_and_the_option_mends_it(idbench, tmp_p
     assert abs(first["size"] - 0.1) < 4 * first["sigma"] + 0.01
     assert first["held_out"][1] < first["held_out"][0]
     report = (tmp_path / "bad/report.html").read_text()
-    figure = report.partition("What the mistakes explain")[2].partition("</svg>\n</svg>")[0].partition("<h2>")[0]
+    figure = report.partition("What the mistakes explain")[2].partition("<h2>")[0]
     assert "torque constant" in figure
     assert "joint3" in figure
     assert first["remedy"] in err.replace("\n", " ") + out.replace("\n", " ")
