@@ -91,6 +91,25 @@ PICTURES = {
     "recording-study": Picture(("study encoder --out OUT",), "study"),
 }
 
+PAGES = {
+    "report": (
+        "new example demo",
+        "identify demo/log.csv --robot demo/arm.xml --torque held --torque-delay estimate --validate demo/second.csv --no-rerun "
+        "--out OUT",
+    ),
+}
+"""Pages that are photographed, and the commands that write them."""
+
+
+def pages(names: list[str]) -> None:
+    """Run what writes a page, and photograph it."""
+    for name in names:
+        with tempfile.TemporaryDirectory(prefix="idbench-") as folder, chdir(folder):
+            for command in PAGES[name]:
+                if idbench(command.replace("OUT", name).split()):
+                    sys.exit(f"{command} failed")
+            photograph(Path(name) / "report.html", DOCS / f"{name}.png")
+
 
 def make(names: list[str]) -> None:
     """Run what is to be seen, each once, and take the pictures."""
@@ -210,7 +229,8 @@ def viewer(folder: Path) -> Iterator[object]:
 
 
 if __name__ == "__main__":
-    unknown = [name for name in sys.argv[1:] if name not in PICTURES]
-    if unknown:
-        sys.exit(f"no picture {unknown[0]!r}; known: {', '.join(PICTURES)}")
-    make(sys.argv[1:] or list(PICTURES))
+    wanted = sys.argv[1:] or [*PICTURES, *PAGES]
+    if unknown := [name for name in wanted if name not in PICTURES and name not in PAGES]:
+        sys.exit(f"no picture {unknown[0]!r}; known: {', '.join((*PICTURES, *PAGES))}")
+    pages([name for name in wanted if name in PAGES])
+    make([name for name in wanted if name in PICTURES])

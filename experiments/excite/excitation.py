@@ -93,7 +93,7 @@ class FourierExcitation(AbstractExcitation):
 @final
 @dataclass(frozen=True)
 class MovesExcitation(AbstractExcitation):
-    """Fifth-order point-to-point moves of equal time, as controllers have that know nothing else."""
+    """Fifth-order moves of equal duration, for controllers that accept only points."""
 
     def shapes(self, t: Array, duration: float, frequency: float) -> Shapes:
         """Return a waypoint each."""

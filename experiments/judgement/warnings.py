@@ -240,7 +240,7 @@ def _left_open(fit: Fit) -> list[str]:
     names = [name for name, share, law in zip(fit.basis.names, shares, of_laws, strict=True) if share > OPEN and law]
     if not names:
         return []
-    return [f"one sigma of these parameters is above {100 * OPEN:g} % of a brisk motion's torque ({model} model): "
+    return [f"poorly known in the {model} model (one sigma above {100 * OPEN:g} % of a brisk motion's torque): "
             f"{_moves(robot_model, names)}"]  # fmt: skip
 
 

@@ -171,7 +171,7 @@ class LoadJudgement:
                 off, noise = (error_percentage(x[j]) for x in (v.percent, v.percent_of_level(v.noise)))
                 yield (
                     f"{name}: the torque of {verdict.joints[j]} is off by {off} by the estimate of all logs, where its noise "
-                    f"makes {noise}: are all logs of this robot, with one payload, in one unit, and is what is stated right?"
+                    f"makes {noise}. Check in this order: the gains (`idbench gains`), the payload in each log, units"
                 )
 
     def _of_stated(self) -> Iterator[str]:

@@ -8,12 +8,13 @@ from rich.console import Console
 from rich.text import Text
 
 from idbench.experiments.loads.known_load import negative_mass
-from idbench.experiments.text import new_table, number, print_titled
+from idbench.experiments.text import new_table, print_titled
 from idbench.identify import IdentificationError
 from idbench.identify.loads.drive_gains import VAGUE, GainEstimate
 from idbench.identify.loads.loaded_robot import LETTERS
 from idbench.identify.loads.payload import PayloadEstimate
 from idbench.identify.parameters.bodies import pseudo_inertia
+from idbench.identify.tables import concise
 
 # Of LETTERS.
 UNITS = (*["kg m^2"] * 6, *["kg m"] * 3, "kg")
@@ -22,11 +23,11 @@ UNITS = (*["kg m^2"] * 6, *["kg m"] * 3, "kg")
 def print_payloads(console: Console, found: Mapping[str, PayloadEstimate | str], link: str) -> None:
     """Print the payload as each way has it, and the body that agrees best with the first."""
     ways = {way: payload for way, payload in found.items() if isinstance(payload, PayloadEstimate)}
-    grid = new_table("", [f"{way}\n{what}" for way in ways for what in ("", "sigma")])
+    grid = new_table("", ["unit", *ways])
     names = next(iter(ways.values())).names
     for i, name in enumerate(names):
-        unit = f" [{UNITS[LETTERS.index(name)]}]" if name in LETTERS else ""
-        grid.add_row(name + unit, *(c for p in ways.values() for c in (number(p.X[i]), f"{p.sigma[i]:.2g}")))
+        unit = UNITS[LETTERS.index(name)] if name in LETTERS else ""
+        grid.add_row(name, unit, *(concise(float(p.X[i]), float(p.sigma[i])) for p in ways.values()))
     print_titled(console, f"payload, about the origin of the frame of {link}", grid, 1)
     for way, why in found.items():
         if isinstance(why, str):
@@ -84,17 +85,16 @@ def payload_summary(found: Mapping[str, PayloadEstimate | str]) -> dict[str, Any
 
 def print_gains(console: Console, found: GainEstimate, given: Sequence[float], joints: Sequence[str]) -> list[str]:
     """Print the gain of each joint; return warnings about those of which the payload says nothing."""
-    grid = new_table("", ["read with", "gain", "sigma", "%sigma", "change %"])
+    grid = new_table("", ["read with", "gain", "%sigma", "change %"])
     for j, joint in enumerate(joints):
         gain, sigma = found.gains[j], found.sigma[j]
         cells = [
             f"{given[j]:.5g}",
-            number(gain),
-            f"{sigma:.2g}",
+            concise(gain, sigma),
             f"{100 * sigma / abs(gain):.2g}",
             f"{100 * (gain / given[j] - 1):+.2f}",
         ]
-        grid.add_row(joint, *(cells if found.shown[j] else [cells[0], "refused", cells[2], cells[3], ""]))
+        grid.add_row(joint, *(cells if found.shown[j] else [cells[0], "refused", cells[2], ""]))
     print_titled(console, "gains of the drives: torque over what was logged", grid, 1)
     lost = [joint for joint, told in zip(joints, found.shown, strict=True) if not told]
     if not lost:

@@ -162,7 +162,8 @@ def _print_logs(console: Console, fit: Fit) -> None:
     grid = new_table("", fit.robot_model.robot.joints)
     for k in range(len(fit.logs.fitted)):
         grid.add_row(fit.logs.name(k), *(f"{x:.2g}" if isfinite(x) else "" for x in errors[k]))
-    print_titled(console, f"residual of the {model} model in each log while joints move: rms [N m, N]", grid)
+    unit = ", ".join(dict.fromkeys(fit.robot_model.units(j)[0] for j in range(fit.basis.n)))
+    print_titled(console, f"residual of the {model} model in each log while joints move: rms [{unit}]", grid)
 
 
 def _rotors(fit: Fit) -> Iterator[str]:

@@ -16,6 +16,7 @@ from idbench.identify.servo.choice import ServoFrictionChoice, lacks_of
 from idbench.identify.servo.fit import TORQUES
 from idbench.identify.servo.mistakes import EXPLAINED, REMAINING, ServoMistake
 from idbench.identify.servo.parameters import SERVO_PARAMETERS
+from idbench.identify.tables import concise
 
 ALIKE = 1.5
 """Error on held-out logs, over that on the fitted ones, up to which a model holds."""
@@ -50,10 +51,10 @@ MISTAKEN: Mapping[str, str] = {
 def print_servos(page: Page, fits: Mapping[str, ServoFit | str]) -> None:
     """Print parameters with their standard errors, and why some joints have none."""
     found = {joint: fit for joint, fit in fits.items() if isinstance(fit, ServoFit)}
-    grid = new_table("", [f"{joint}\n{what}" for joint in found for what in ("", "sigma")])
+    grid = new_table("", found)
     for name in SERVO_PARAMETERS:
         if any(name in fit.p for fit in found.values()):
-            cells = (cell for fit in found.values() for cell in _cells(fit, name))
+            cells = (_cell(fit, name) for fit in found.values())
             grid.add_row(f"{name} [{unit_of(next(iter(found.values())).servo, name)}]", *cells)
     laws = dict.fromkeys(LAWS[fit.servo.kind] for fit in found.values())
     print_titled(page, f"servos: torque = {', or '.join(laws)}, friction and armature at the joint", grid)
@@ -62,14 +63,15 @@ def print_servos(page: Page, fits: Mapping[str, ServoFit | str]) -> None:
             page.print(Text(f"{joint}: no estimate: {fit}"), soft_wrap=True)
 
 
-def _cells(fit: ServoFit, name: str) -> tuple[str, str]:
+def _cell(fit: ServoFit, name: str) -> str:
+    """Return a parameter with its standard error, or the factor that it is known up to."""
     if name not in fit.p:
-        return "", ""
+        return ""
     sigma = fit.standard_errors.get(name)
     if name in TORQUES and not fit.scaled and name not in fit.known:
         low, high = fit.factor
-        return number(fit.p[name]), f"x {low:.2g} to {high:.2g}"
-    return number(fit.p[name]), "held" if sigma is None else f"{sigma:.2g}"
+        return f"{number(fit.p[name])} x {low:.2g} to {high:.2g}"
+    return f"{number(fit.p[name])} held" if sigma is None else concise(fit.p[name], sigma)
 
 
 def print_errors(page: Page, what: str, errors: Mapping[str, Array]) -> None:

@@ -110,7 +110,7 @@ def unhurried(err):
         ("full-neg", "empty-neg", [], ["wrong sign", "below zero"]),
         ("full-neg", "empty", [], ["full-neg.parquet: friction drives"]),
         ("full-kilo", "empty", [], ["full-kilo.parquet: the torques are", "are they in N m?", "poor"]),
-        ("full-other", "empty", [], ["full-other.parquet: poor", "are all logs of this robot"]),
+        ("full-other", "empty", [], ["full-other.parquet: poor", "Check in this order: the gains"]),
         ("full", "empty", ["--mass", "3"], ["--mass: ML = 3 is stated, the logs show", "sigma away", "poor"]),
     ],
 )

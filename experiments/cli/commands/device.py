@@ -8,7 +8,8 @@ from idbench.experiments.identification.robot_model import absolute
 from idbench.experiments.results.page import Page, new_page
 from idbench.experiments.results.writing import require_free, write_text
 from idbench.experiments.servo.device import BENCH, device_of, devices, mjcf_of_device, servo_toml_of
-from idbench.experiments.text import new_table, number, print_titled
+from idbench.experiments.text import new_table, print_titled
+from idbench.identify.tables import concise
 from idbench.sim.robot.robot import Robot
 
 
@@ -45,10 +46,10 @@ def device(options: ShowDevice) -> None:
 
 def _print(page: Page, name: str) -> None:
     known = device_of(name)
-    grid = new_table("", ["value", "sigma", "spread between units"])
+    grid = new_table("", ["value", "unit", "spread between units"])
     for letter, of in known["parameters"].items():
-        sigma, spread = ("" if x is None else f"{x:.2g}" for x in (of["sigma"], of["spread"]))
-        grid.add_row(f"{letter} [{of['unit']}]", number(of["value"]), sigma, spread)
+        spread = "" if of["spread"] is None else f"{of['spread']:.2g}"
+        grid.add_row(letter, concise(of["value"], of["sigma"] or 0.0), of["unit"], spread)
     units = f"{known['units']} unit{'s' if known['units'] > 1 else ''}"
     print_titled(page, f"{name}, {units}, friction law {known['friction']}", grid)
     page.print(Text(known["source"]), soft_wrap=True)
