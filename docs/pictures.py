@@ -94,8 +94,8 @@ PICTURES = {
 PAGES = {
     "report": (
         "new example demo",
-        "identify demo/log.csv --robot demo/arm.xml --torque held --torque-delay estimate --validate demo/second.csv --no-rerun "
-        "--out OUT",
+        "identify demo/log.csv --robot demo/arm.xml --torque held --torque-delay estimate --validate demo/second.csv "
+        "--no-rerun --out OUT",
     ),
 }
 """Pages that are photographed, and the commands that write them."""

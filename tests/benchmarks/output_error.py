@@ -2,8 +2,8 @@
 
     uv run --group benchmark python tests/benchmarks/output_error.py
 
-A closed loop at 100 Hz with 16-bit encoders, 46 s. `mujoco.sysid` starts 30 % off, simulates windows and gets the torque as it was
-held, with two settings: windows of 2 s that begin with differenced counts, and windows of 5 s that begin with positions and
+A closed loop at 100 Hz with 16-bit encoders, 46 s. `mujoco.sysid` starts 30 % off, simulates windows and gets the torque as it
+was held, with two settings: windows of 2 s that begin with differenced counts, and windows of 5 s that begin with positions and
 velocities filtered at 10 Hz, with a link of 4 kg that stays physical far from the truth (the mass shows in no torque).
 """
 

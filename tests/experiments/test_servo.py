@@ -92,6 +92,9 @@ def test_servo_of_a_bench_is_found_and_written(bench, idbench):
     assert model.dof_armature[0] == found["Ia"]
     assert model.nu == 1
     assert "axis: good: the model holds on other logs" in out
+    report = Path("results/report.html").read_text()
+    assert "axis: good: the model holds on other logs" in report
+    assert "Positions: new.csv" in report
     assert {"servo/axis/q/measured", "servo/axis/q/simulated", "servo/axis/residual"} <= known([Path("results/recording.rrd")])[
         1
     ]

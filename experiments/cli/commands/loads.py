@@ -23,6 +23,9 @@ from idbench.experiments.text import new_table, print_titled
 from idbench.identify.loads.payload import PayloadEstimate
 from idbench.sim.robot.rewrite import with_body
 
+NOT_MADE_AGAIN = ("force", "json", "write_mjcf")
+"""Options that a report does not name where it says how to make it again."""
+
 
 def payload(options: IdentifyPayload) -> None:
     """Identify what the gripper holds."""
@@ -40,6 +43,7 @@ def payload(options: IdentifyPayload) -> None:
         _print_payload(page, options, made)
         with _finish(page, folder) as attempts:
             _judge(page, made.judgement, made.leading, attempts, folder)
+            attempts.file("report.html", lambda: _report(made, command_of("payload", options, "log", NOT_MADE_AGAIN)))
             if options.write_mjcf is not None:
                 robot_model = made.judgement.request.robot_model
                 attempts.attempt("--write-mjcf", lambda: _write_mjcf(page, options, robot_model, made.leading))
@@ -57,6 +61,13 @@ def gains(options: IdentifyGains) -> None:
         _print_gains(page, options, made)
         with _finish(page, folder) as attempts:
             _judge(page, made.judgement, None, attempts, folder)
+            attempts.file("report.html", lambda: _report(made, command_of("gains", options, "log", NOT_MADE_AGAIN)))
+
+
+def _report(made: PayloadFit | GainsFit, command: str) -> str:
+    from idbench.experiments.reports.others import report_of_load
+
+    return report_of_load(made, command)
 
 
 def _print_payload(page: Page, options: IdentifyPayload, made: PayloadFit) -> None:
@@ -158,7 +169,7 @@ def _summary(score: PairScore) -> dict[str, Any]:
 def _folder(options: IdentifyPayload | IdentifyGains, experiment: str) -> ResultsFolder | None:
     if options.out is None:
         return None
-    command = command_of(experiment, options, "log", ("out", "force", "json", "write_mjcf"), absolute=True)
+    command = command_of(experiment, options, "log", ("out", *NOT_MADE_AGAIN), absolute=True)
     folder = ResultsFolder(options.out, experiment, command, options.force, files_of(options))
     folder.check()
     return folder

@@ -36,6 +36,10 @@ if TYPE_CHECKING:
     from idbench.experiments.results.attempts import Streams
 
 
+NOT_MADE_AGAIN = ("force", "json", "write_mjcf", "write", "watching")
+"""Options that a report does not name where it says how to make it again."""
+
+
 def servo(options: IdentifyServo) -> None:
     """Identify servos."""
     page, folder = new_page(machine=options.json), _folder(options)
@@ -61,6 +65,8 @@ def servo(options: IdentifyServo) -> None:
             if options.write_mjcf is not None:
                 attempts.attempt("--write-mjcf", lambda: _write(page, options, servos, others, found))
                 attempts.attempt("summary.json", lambda: save_summary(page, folder))
+            command = command_of("servo", options, "log", NOT_MADE_AGAIN)
+            attempts.file("report.html", lambda: _report(made, command))
             if options.write is not None:
                 attempts.attempt("--write", lambda: _write_function(page, options, servos, found))
             if options.watching.rerun and (folder is not None or audience is not None):
@@ -121,6 +127,12 @@ def _write_function(page: Page, options: IdentifyServo, servos: Servos, found: d
     page.print(Text(f"written to {path}: the servos as a Python file"), soft_wrap=True)
 
 
+def _report(made: ServosFit, command: str) -> str:
+    from idbench.experiments.reports.others import report_of_servos
+
+    return report_of_servos(made, made.servos.notes, command)
+
+
 def _recorded(servos: Servos, found: dict[str, ServoFit], audience: Audience | None) -> "Streams":
     from idbench.experiments.recording.servo_recording import record_servos
 
@@ -131,7 +143,7 @@ def _recorded(servos: Servos, found: dict[str, ServoFit], audience: Audience | N
 def _folder(options: IdentifyServo) -> ResultsFolder | None:
     if options.out is None:
         return None
-    command = command_of("servo", options, "log", ("out", "force", "json", "write_mjcf", "write", "watching"), absolute=True)
+    command = command_of("servo", options, "log", ("out", *NOT_MADE_AGAIN), absolute=True)
     folder = ResultsFolder(options.out, "servo", command, options.force, files_of(options))
     folder.check()
     return folder

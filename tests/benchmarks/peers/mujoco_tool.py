@@ -2,7 +2,7 @@
 
     uv run --group benchmark python tests/benchmarks/peers/mujoco_tool.py runs/simulated/scara-*-[0-2]
 
-It starts 30 % off and simulates windows of 2 s, as in tests/benchmarks/output_error.py. Torques of the held-out logs, by the
+It starts 30 % off and simulates windows of 5 s, as in tests/benchmarks/output_error.py. Torques of the held-out logs, by the
 columns of the SCARA, go into predicted-mujoco.npz.
 """
 
@@ -20,7 +20,8 @@ from idbench.identify.signals.signals import State
 from idbench.sim.robot.robot import Robot
 from idbench.sim.robot.scara import scara_truth
 
-OUTPUT_ERROR = runpy.run_path(str(Path(__file__).parent.parent / "output_error.py"))["output_error"]
+FILE = runpy.run_path(str(Path(__file__).parent.parent / "output_error.py"))
+OUTPUT_ERROR, SETTING = FILE["output_error"], FILE["SETTINGS"]["mujoco.sysid, 5 s"]
 NOTE = "output error, start 30 % off, windows of 2 s, at 100 Hz"
 
 RATE = 100.0
@@ -52,7 +53,7 @@ def predicted(log: MotionLog, X: np.ndarray) -> np.ndarray:
 def of_set(folder: Path) -> None:
     told, truth = json.loads((folder / "summary.json").read_text())["tools_read"], scara_truth(Robot.load("scara"))
     begin = time.perf_counter()
-    X = OUTPUT_ERROR(thinned(read(folder / told["fit"][0])), truth)
+    X = OUTPUT_ERROR(thinned(read(folder / told["fit"][0])), truth, SETTING)
     seconds = time.perf_counter() - begin
     every = {f"held_out{k + 1}": predicted(read(folder / name), X) for k, name in enumerate(told["held_out"])}
     np.savez(folder / "predicted-mujoco.npz", seconds=seconds, note=NOTE, **every)
