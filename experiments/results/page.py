@@ -1,6 +1,7 @@
 """What a command prints: shown as soon as it is complete, whatever becomes of the rest."""
 
 import json
+import re
 import sys
 import threading
 import time
@@ -17,7 +18,10 @@ from rich.text import Text
 from idbench.experiments.errors import ExperimentError, visible
 
 EVERY = 15.0
-"""Time [s] between lines, where there is no terminal."""
+"""Time [s] between lines at the least, where there is no terminal."""
+
+LONGEST = 55.0
+"""Time [s] of a stage without a line."""
 
 
 class Told(Protocol):
@@ -74,15 +78,19 @@ def _bar(console: Console, what: str) -> Iterator[Told]:
 
 @contextmanager
 def _lines(console: Console, what: str) -> Iterator[Told]:
-    """Print a line every EVERY seconds, also while a stage takes longer."""
+    """Print a line where the stage has changed, looked at every EVERY seconds; one that takes longer has a line a minute."""
     done = threading.Event()
-    now = [""]
+    now: list[str] = [""]
+    last: list[Any] = [None, 0.0]
     start = time.monotonic()
 
     def tick() -> None:
         while not done.wait(EVERY):
-            stage = f": {now[0]}" if now[0] else ""
-            console.print(f"{what}{stage}, {time.monotonic() - start:.0f} s", highlight=False, soft_wrap=True)
+            words, seconds = re.sub(r"[\d.,%]+", "", now[0]), time.monotonic() - start
+            if words != last[0] or seconds - last[1] > LONGEST:
+                last[:] = words, seconds
+                stage = f": {now[0]}" if now[0] else ""
+                console.print(f"{what}{stage}, {seconds:.0f} s", highlight=False, soft_wrap=True)
 
     def receive(stage: str, share: float | None = None) -> None:
         del share
