@@ -172,7 +172,8 @@ class TreeLinks(AbstractConservativeBlock):
         """Return the columns that are asked for and not zero at all times."""
         if isinstance(state.q, np.ndarray):
             return _replay(self.tree, self.only, function).of(state)
-        return _asked(_formulas(self.tree, function, state), self.only)
+        columns, shape = _asked(_formulas(self.tree, function, state), self.only), state.q[..., 0, :].shape
+        return {key: np.full(shape, x) if isinstance(x, float) else x for key, x in columns.items()}
 
 
 def _massive(tree: KinematicTree) -> tuple[int, ...]:

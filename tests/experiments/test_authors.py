@@ -1,5 +1,6 @@
 """What authors begin with runs as it is; a plug-in that breaks its contract is reported where."""
 
+import csv
 import subprocess
 import sys
 import tomllib
@@ -106,10 +107,18 @@ def test_an_example_is_an_arm_with_two_logs_that_agree(here, capsys):
     """As README types it: one is fitted, the other validates; a folder that is there stays as it is."""
     assert main(["new", "example", "mine"]) == 0
     assert "idbench identify mine/log.csv --robot mine/arm.xml" in capsys.readouterr().out
-    assert sorted(path.name for path in (here / "mine").iterdir()) == ["arm.xml", "log.csv", "second.csv"]
+    assert sorted(path.name for path in (here / "mine").iterdir()) == ["arm.xml", "log.csv", "second.csv", "truth.csv"]
     words = ["--robot", "mine/arm.xml", "--torque", "held", "--torque-delay", "estimate", "--validate", "mine/second.csv"]
     assert main(["identify", "mine/log.csv", *words]) == 0
-    last = capsys.readouterr().out.strip().splitlines()[-1]
-    assert last.startswith("Result: good (explicit model)")
+    first, *lines = capsys.readouterr().out.splitlines()
+    assert first.startswith("Result: good (explicit model)")
+    with (here / "mine" / "truth.csv").open() as file:
+        truth = {row["parameter"]: float(row["value"]) for row in csv.DictReader(file)}
+    found = {line.split()[0]: line.split()[1] for line in lines if line.split()[:1] and line.split()[0] in truth}
+    assert found.keys() == truth.keys()
+    for name, text in found.items():
+        value, error = text.rstrip(")").split("(")
+        sigma = int(error) * 10.0 ** -len(value.partition(".")[2])
+        assert abs(float(value) - truth[name]) < 4 * sigma, name
     assert main(["new", "example", "mine"]) == 2
     assert "mine exists" in capsys.readouterr().err

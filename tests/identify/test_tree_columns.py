@@ -194,6 +194,7 @@ def test_any_sign_that_is_changed_is_noticed(peer, monkeypatch):
     for name, tree in trees.items():
         for change, back in list(sites(tree)):
             change()
+            same = False
             try:
                 block = loaded(trees, monkeypatch)
                 mutated = {f: getattr(block(slanted), f)(at(*states(6))) for f in right}
