@@ -13,8 +13,9 @@ from idbench.identify.basis.friction.laws import CoulombFriction, ViscousFrictio
 from idbench.identify.basis.friction.load import TiedFriction
 from idbench.identify.basis.joint_law import AbstractFriction, Armature
 from idbench.identify.basis.of_joints import Coupled, OfJoints
-from idbench.identify.basis.replay import Program, recorded_motion
+from idbench.identify.basis.replay import Program, at_one_instant, recorded_motion
 from idbench.identify.basis.springs import Spring
+from idbench.identify.basis.symbols import SymbolArray
 from idbench.identify.basis.tape import Tape
 from idbench.identify.basis.twists import (
     ZERO,
@@ -172,8 +173,8 @@ class TreeLinks(AbstractConservativeBlock):
         """Return the columns that are asked for and not zero at all times."""
         if isinstance(state.q, np.ndarray):
             return _replay(self.tree, self.only, function).of(state)
-        columns, shape = _asked(_formulas(self.tree, function, state), self.only), state.q[..., 0, :].shape
-        return {key: np.full(shape, x) if isinstance(x, float) else x for key, x in columns.items()}
+        columns: Any = _asked(_formulas(self.tree, function, at_one_instant(state)), self.only)
+        return {key: SymbolArray([x]) for key, x in columns.items()}
 
 
 def _massive(tree: KinematicTree) -> tuple[int, ...]:
