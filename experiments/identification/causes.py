@@ -11,6 +11,7 @@ from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.text import error_percentage
 from idbench.identify import Array, MotionLog
 from idbench.identify.judge.suspect import Suspect
+from idbench.identify.tables import concise
 
 
 class Wording(NamedTuple):
@@ -213,7 +214,7 @@ class Cause:
         gains[j] *= -1.0 if s.cause == "sign" else 1 / (1 + s.size[0]) if s.cause == "gain" else 1.0
         last = min(j + 1, len(joints) - 1)
         return {
-            "size": f"{size:.3g} +- {sigma:.1g}{unit}" if sigma else f"{size:.3g}{unit}",
+            "size": f"{concise(size, sigma)}{unit}" if sigma else f"{size:.3g}{unit}",
             "instant": "" if s.instant is None else f"{s.instant:.1f} s{'' if s.log is None else f' of log {s.log + 1}'}",
             "large": "large" if s.size[0] > 0 else "small",
             "late": "late" if s.size[0] > 0 else "early",
