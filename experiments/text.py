@@ -184,6 +184,11 @@ def percentage(x: float) -> str:
     return f"{x:.2g}" if x < 99.5 else f"{x:.0f}" if x < WORTHLESS else f">{WORTHLESS:g}" if x >= WORTHLESS else ""
 
 
+def relative(x: float, sigma: float) -> str:
+    """Return a standard error in per cent of its value; a question mark if it is not known."""
+    return "?" if isnan(sigma) else percentage(100 * sigma / abs(x) if x else float("inf"))
+
+
 def probability(p: float) -> str:
     """Return a probability to two digits with its sign, = or <."""
     return f"= {p:.2g}" if p >= UNBELIEVED else f"< {UNBELIEVED:g}"

@@ -1,11 +1,15 @@
 """Tables of what is shown in a Python session: as text, and in a notebook."""
 
 from collections.abc import Sequence
+from decimal import Decimal
 from html import escape
-from math import floor, log10
+from math import floor, isfinite, log10
 
-SMALLEST = -3
-"""Powers of ten below this are written as such."""
+SMALLEST, LARGEST = -3, 6
+"""Powers of ten beyond these are written as such."""
+
+DIGITS = 1e-13
+"""Standard errors over values from here on are rounding."""
 
 Rows = Sequence[Sequence[str]]
 
@@ -30,19 +34,24 @@ def html_table(title: str, heads: Sequence[str], rows: Rows) -> str:
 def concise(x: float, sigma: float) -> str:
     """Return a value with its standard error in the last digits, to the second digit of the error (GUM, section 7.2.2).
 
+    A value whose error is not known has a question mark; one without an error stands alone.
+
     Examples
     --------
     >>> concise(0.48878, 0.0033), concise(-0.3, 1.2), concise(12345.6, 230.0), concise(1.234e-7, 4.5e-9)
     ('0.4888(33)', '-0.3(1.2)', '12350(230)', '1.234(45)e-07')
     """
-    if not (sigma > 0 and abs(x) < 1e300 and sigma < 1e300):
-        return f"{x:.5g}"
+    if not (isfinite(x) and isfinite(sigma)):
+        return f"{x:.5g}(?)"
+    if sigma <= max(DIGITS * abs(x), 1e-300):
+        return f"{x:.6g}"
     last = floor(log10(sigma)) - 1
     if (digits := round(sigma / 10.0**last)) == 100:
         digits, last = 10, last + 1
-    power = floor(log10(max(abs(x), sigma)))
-    power = power if power < SMALLEST else 0
-    decimals = max(power - last, 0)
-    error = f"{digits * 10.0 ** (last - power):.{decimals}f}" if last - power >= -1 else f"{digits}"
-    mantissa = round(x / 10.0**last) * 10.0 ** (last - power)
-    return f"{mantissa:.{decimals}f}({error})" + (f"e{power:+03d}" if power else "")
+    rounded = round(x / 10.0**last)
+    power = max(len(str(abs(rounded))), len(str(digits))) - 1 + last
+    power = 0 if SMALLEST <= power <= LARGEST else power
+    places = power - last
+    error = Decimal(digits).scaleb(-places if places < 2 else 0)
+    value = Decimal(rounded).scaleb(-places)
+    return f"{value:.{max(places, 0)}f}({error:f})" + (f"e{power:+03d}" if power else "")

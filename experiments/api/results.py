@@ -23,6 +23,7 @@ from idbench.experiments.judgement.remedies import checks
 from idbench.experiments.reports.estimates import conclusion
 from idbench.experiments.results.attempts import Attempts
 from idbench.experiments.results.writing import folder_for, write_text
+from idbench.experiments.text import relative
 from idbench.identify import Array, MotionLog, Problem, State, Validation, validate
 from idbench.identify.arrays import combined
 from idbench.identify.judge.torque_interval import torque_interval
@@ -267,8 +268,13 @@ class Identification:
     def _rows(self) -> Iterator[list[str]]:
         functions = {p.name for p in self.fit.basis.parameters if p.is_random_effect}
         for p in (p for p in self.parameters.values() if p.name not in functions):
-            share = f"{100 * p.sigma / abs(p.value):.2g}" if p.value else ""
-            yield [p.name, concise(p.value, p.sigma), p.unit, share, *([] if p.truth is None else [f"{p.truth:.6g}"])]
+            yield [
+                p.name,
+                concise(p.value, p.sigma),
+                p.unit,
+                relative(p.value, p.sigma),
+                *([] if p.truth is None else [f"{p.truth:.6g}"]),
+            ]
 
 
 @final

@@ -28,7 +28,7 @@ def print_payloads(console: Console, found: Mapping[str, PayloadEstimate | str],
     for i, name in enumerate(names):
         unit = UNITS[LETTERS.index(name)] if name in LETTERS else ""
         grid.add_row(name, unit, *(concise(float(p.X[i]), float(p.sigma[i])) for p in ways.values()))
-    print_titled(console, f"payload, about the origin of the frame of {link}", grid, 1)
+    print_titled(console, f"payload, about the origin of the frame of {link}", grid, 2)
     for way, why in found.items():
         if isinstance(why, str):
             console.print(Text(f"{way}: no estimate: {why}"), soft_wrap=True)

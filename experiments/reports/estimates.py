@@ -11,7 +11,7 @@ from idbench.experiments.identification.fit import Fit
 from idbench.experiments.judgement.held_out import HeldOut
 from idbench.experiments.judgement.judgement import Judgement
 from idbench.experiments.judgement.warnings import FLAGS, doubtful, used
-from idbench.experiments.text import WORTHLESS, error_percentage, number, percent, percentage
+from idbench.experiments.text import WORTHLESS, error_percentage, number, percent, relative
 from idbench.identify import Estimate
 from idbench.identify.arrays import Array
 from idbench.identify.tables import concise
@@ -85,7 +85,7 @@ class EstimatesTable:
 
     def _cells(self, model: str, estimate: Estimate, i: int) -> Iterator[str]:
         x, sigma = estimate.X[i], estimate.standard_errors[i]
-        share = percentage(100 * sigma / abs(x) if x else float("inf")) or f">{WORTHLESS:g}"
+        share = relative(x, sigma)
         first, second, last = self._marks[model][i] if self.legend else ("", "", "")
         if self.fit.truth is None:
             yield from (f"{concise(x, sigma)}{first}", f"{share}{last}")
@@ -105,6 +105,9 @@ def _explained(share: float) -> str:
         return "no torque"
     return f"{100 * share:.3f} %" if share > -WORTHLESS / 100 else f"<-{WORTHLESS:g} %"
 
+
+LEAST = 0.01
+"""Difference in sigma that means nothing."""
 
 SAME = 0.99
 """Errors in multiples of an earlier model's from which on a later one is no better."""
@@ -133,14 +136,17 @@ def differing(fit: Fit, whole: Sequence[str]) -> Iterator[str]:
             sigma = np.maximum(np.hypot(estimate.standard_errors, lead.standard_errors), 1e-300)
             far[model] = float(np.max(np.abs(estimate.X - lead.X) / sigma))
     if far:
-        each = ", ".join(f"{model} by at most {x:.1g} sigma" for model, x in far.items())
+        each = ", ".join(
+            f"{model} by {f'at most {x:.1g}' if x >= LEAST else 'less than 0.01'} sigma" for model, x in far.items()
+        )
         yield f"other models differ: {each} (--model all shows them)"
 
 
 def explained(share: Array) -> str:
     """Return which shares of the torques, shape (joint,), a model explains, in words."""
     known = 100 * share[np.isfinite(share)]
-    return f"{max(known.min(), 0):.3f} to {known.max():.3f} %" if known.size else "nothing"
+    each = [f"{max(x, 0):.3f}" for x in (known.min(), known.max())] if known.size else []
+    return f"{' to '.join(dict.fromkeys(each))} %" if each else "nothing"
 
 
 def conclusion(judgement: Judgement, warnings: Mapping[str, Sequence[str]]) -> tuple[str, str]:

@@ -8,7 +8,7 @@ import numpy as np
 from idbench.experiments.identification.fit import Fit
 from idbench.experiments.judgement.warnings import doubtful
 from idbench.experiments.reports.figures import color_of
-from idbench.experiments.text import SIGMAS, percentage
+from idbench.experiments.text import SIGMAS, relative
 from idbench.identify.tables import concise
 
 WIDE, HIGH = 220.0, 14.0
@@ -50,7 +50,7 @@ def parameter_rows(fit: Fit) -> Iterator[ParameterRow]:
             parameter.name,
             f"{concise(x, sigma)}{''.join(marks[i]).strip()}",
             parameter.unit,
-            percentage(100 * sigma / abs(x)) if x else "",
+            relative(x, sigma),
             "" if filed is None else f"{filed:.4g}",
             _interval(fit, i, filed),
             made.get(parameter.name, ""),
@@ -68,6 +68,8 @@ def _interval(fit: Fit, i: int, filed: float | None) -> str:
         ends.append(0.0)
     room = 0.15 * (max(ends) - min(ends)) or 0.1 * abs(first) or 1.0
     low, high = min(ends) - room, max(ends) + room
+    if not np.isfinite([low, high]).all():
+        return ""
 
     def at(x: float) -> float:
         return float(np.clip(WIDE * (x - low) / (high - low), 0.0, WIDE))

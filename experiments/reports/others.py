@@ -10,9 +10,10 @@ from idbench.experiments.reports.figures import color_of, rendered
 from idbench.experiments.reports.panels import Panel, figure
 from idbench.experiments.servo.identification import unit_of
 from idbench.experiments.servo.job import ServosFit
-from idbench.experiments.servo.servo_text import warnings_of
+from idbench.experiments.servo.servo_text import value_of, warnings_of
 from idbench.identify.loads.loaded_robot import LETTERS
 from idbench.identify.loads.payload import PayloadEstimate
+from idbench.identify.servo.parameters import SERVO_PARAMETERS
 from idbench.identify.tables import concise
 
 COMMAND, MEASURED = "#c9a227", "#8c8c8c"
@@ -36,9 +37,10 @@ def report_of_servos(made: ServosFit, notes: Sequence[str], command: str) -> str
         moved.append(panel)
         off.append(error)
     rows = [
-        [joint, name, _value(x, fit.standard_errors.get(name)), unit_of(fit.servo, name)]
+        [joint, name, value_of(fit, name), unit_of(fit.servo, name)]
         for joint, fit in made.fits.items()
-        for name, x in fit.p.items()
+        for name in SERVO_PARAMETERS
+        if name in fit.p
     ]
     name = judged.name(path)
     return _page(
@@ -70,8 +72,10 @@ def report_of_load(made: PayloadFit | GainsFit, command: str) -> str:
         table = f"Payload, about the origin of the frame of {joints[-1]}", ["parameter", *ways, "unit"], rows
     else:
         rows = [
-            [joint, concise(float(made.found.gains[j]), float(made.found.sigma[j])), f"{made.given[j]:.5g}"]
-            for j, joint in enumerate(joints)
+            [joint, concise(gain, sigma) if told else "refused", f"{read:.5g}"]
+            for joint, gain, sigma, told, read in zip(
+                joints, *(x.tolist() for x in (made.found.gains, made.found.sigma, made.found.shown, made.given)), strict=True
+            )
         ]
         table = "Gains of the drives: torque over what was logged", ["joint", "gain", "read with"], rows
     word = judgement.word(warnings)
@@ -98,10 +102,6 @@ def _page(title: str, subtitle: str, **words: Any) -> str:
 def _word(line: str) -> str:
     """Return the verdict in a line about a joint."""
     return next((word for word in ("good", "fair", "poor") if f": {word}" in line), "unsure")
-
-
-def _value(x: float, sigma: float | None) -> str:
-    return f"{x:.5g} (held)" if sigma is None else concise(x, sigma)
 
 
 def _unit(name: str) -> str:

@@ -27,6 +27,7 @@ from idbench.experiments.reports.intervals import parameter_rows
 from idbench.experiments.reports.uncertainty import correlated, error_shares
 from idbench.experiments.results.attempts import Attempts
 from idbench.experiments.text import percentage
+from idbench.identify.noise.linearization import smoothed
 
 T = TypeVar("T")
 
@@ -74,6 +75,7 @@ def report(
         friction=_figure(attempts, "friction", friction_figure, fit),
         spectra=_figure(attempts, "spectra", spectra_figure, fit),
         joints=robot_model.robot.joints,
+        force=", ".join(dict.fromkeys(robot_model.units(j)[0] for j in range(fit.basis.n))),
         logs=list(_logs(fit)),
         notes=notes,
         command=command,
@@ -121,15 +123,18 @@ def _torque_errors(one: HeldOut) -> Iterator[list[str]]:
 
 
 def _ranges(fit: Fit) -> Iterator[list[str]]:
-    """Yield the largest speeds, accelerations and torques of the fitted logs, by joint: where the result holds."""
-    states = [signals.state for signals in fit.problem.signals]
-    largest = np.array([np.max([np.abs(x).max(axis=-1) for x in each], axis=0) for each in (
-        [state.qd for state in states], [state.qdd for state in states], [log.tau.T for log in fit.logs.fitted],
-    )])  # fmt: skip
+    """Yield, by joint, the largest speeds, accelerations and torques of the fitted logs without their noise: where it holds."""
+    n, missing = fit.basis.n, {j for log in fit.logs.fitted for j in log.missing}
+    largest = np.zeros((3, n))
+    for signals in fit.problem.signals:
+        grid = fit.problem.own_chain.grid(signals.log)
+        inner, state = slice(grid.first, grid.first + grid.step * grid.count), signals.state
+        slow = (smoothed(x, signals.fs)[..., inner] for x in (state.qd, state.qdd, signals.torque.mean))
+        largest = np.maximum(largest, [np.abs(x).max(axis=-1) for x in slow])
     for j, joint in enumerate(fit.robot_model.robot.joints):
         torque, position = fit.robot_model.units(j)
-        each = zip(largest[:, j], (f"{position}/s", f"{position}/s^2", torque), strict=True)
-        yield [joint, *(f"{x:.3g} {unit}" for x, unit in each)]
+        each = [f"{x:.3g} {unit}" for x, unit in zip(largest[:, j], (f"{position}/s", f"{position}/s^2", torque), strict=True)]
+        yield [joint, *each[:2], "not logged" if j in missing else each[2]]
 
 
 def _logs(fit: Fit) -> Iterator[list[Any]]:

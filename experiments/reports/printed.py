@@ -46,18 +46,19 @@ def print_fit(console: Console, fit: Fit, title: str, whole: tuple[str, ...], *,
     """
     table = EstimatesTable(fit, whole)
     of = f"{whole[0]} model, " if len(whole) == 1 else ""
-    grid = _grid(table, console.width, verbose or fit.truth is not None)
+    grid = _grid(table, console.width, complete=verbose or fit.truth is not None)
     print_titled(console, f"{title}: {of}{fit.request.estimator}, chain {fit.request.chain}", grid, 2 + (fit.truth is not None))
     if table.legend:
         console.print(Text(table.legend))
-    for words in (*differing(fit, whole), *_told(fit), *(_details(fit) if verbose else ())):
+    complete = len(whole) > 1 and (verbose or fit.truth is not None)
+    for words in (*differing(fit, whole), *_told(fit), *(_details(fit, complete) if verbose else ())):
         console.print(Text(words), soft_wrap=True)
     if len(fit.logs.fitted) > 1 and fit.torque_errors:
         _print_logs(console, fit)
     console.print()
 
 
-def _grid(table: EstimatesTable, width: int, complete: bool) -> Table:
+def _grid(table: EstimatesTable, width: int, *, complete: bool) -> Table:
     """Return the table of the parameters, and of the fit as a whole if it shall be complete."""
     heads, rows = [f"{first}\n{second}" for first, second in table.heads], list(table.rows())
     if len(table.estimates) == 1:
@@ -98,7 +99,7 @@ def _style(cells: Sequence[str]) -> str:
     if any(cell.endswith(("!", "*")) for cell in cells):
         return "red"
     share = cells[-1].rstrip("? ")
-    return "dim" if share.startswith(">") or (share and float(share) > 100) else ""
+    return "dim" if not share or share.startswith(">") or float(share) > 100 else ""
 
 
 def _told(fit: Fit) -> Iterator[str]:
@@ -136,9 +137,9 @@ def _told(fit: Fit) -> Iterator[str]:
         yield f"roughly known: {', '.join(fit.robot_model.asked.prior)}{near}"
 
 
-def _details(fit: Fit) -> Iterator[str]:
-    """Yield how each model fits, rates, noise, what limits the standard errors, mistakes, iterations."""
-    for model, estimate in fit.estimates.items():
+def _details(fit: Fit, complete: bool) -> Iterator[str]:
+    """Yield how each model fits unless its table is `complete`, rates, noise, what limits the standard errors, mistakes."""
+    for model, estimate in fit.estimates.items() if not complete else ():
         share = explained(fit.explained[model])
         yield f"{model}: Cond(W) {estimate.condition_number:.1f}, {estimate.row_count} rows, explains {share} of the torques"
     if fit.rates:
@@ -191,7 +192,8 @@ def _noise(fit: Fit) -> str:
     torque = " ".join("?" if x is None else f"{x:.2g}" for x in fit.noise["torque"])
     position = " ".join("?" if x is None else f"{x:.2g}" for x in fit.noise["position"])
     slides = [joint.kind == "slide" for joint in fit.robot_model.tree.joints]
-    force, length = ("N m, N", "rad, m") if any(slides) else ("N m", "rad")
+    units = (fit.robot_model.units(j) for j in range(fit.basis.n))
+    force, length = (", ".join(dict.fromkeys(each)) for each in zip(*units, strict=True))
     words = f"white noise of the log: torque {torque} {force}, position {position} {length}"
     steps = fit.noise["encoder_step"]
     if not any(steps):
@@ -246,9 +248,10 @@ def _details_of(one: HeldOut, standing: Array) -> Iterator[str]:
     joints = one.fit.robot_model.robot.joints
     if (within := one.within_interval(best)) is not None and one.fit.torque_intervals[best] is not None:
         yield _interval_words(one, best, *within)
-    apart = [f"{joint} {rms:.2g}" for joint, rms in zip(joints, standing, strict=True) if isfinite(rms)]
-    if apart:
-        yield f"at rest and reversing, where friction is not determined: {', '.join(apart)} N m"
+    units = (one.fit.robot_model.units(j)[0] for j in range(len(joints)))
+    each = zip(joints, standing, units, strict=True)
+    if apart := [f"{joint} {rms:.2g} {unit}" for joint, rms, unit in each if isfinite(rms)]:
+        yield f"at rest and reversing, where friction is not determined: {', '.join(apart)}"
     for words, (model, *others) in _alike({model: (v.word, *v.reasons) for model, v in one.verdicts.items()}).items():
         same = f" ({', '.join(others)}: the same)" if others else ""
         yield f"{model}: {words[0]}: {'; '.join(words[1:])}{same}"

@@ -62,6 +62,8 @@ def error_shares(estimate: Estimate) -> Iterator[tuple[str, float, str, float]]:
         parts["change from log to log"] = np.broadcast_to(error.scatter, total.shape)
     for cause, variance in parts.items():
         share = 100 * variance / total
+        if not np.isfinite(share).any() or not np.any(variance):  # a cause that is not known here
+            continue
         most = int(np.nanargmax(share))
         yield cause, float(np.nanmedian(share)), estimate.names[most], float(share[most])
 

@@ -152,9 +152,9 @@ class Page(Console):
         if len(there) > 1:
             self.print(Text("Check these first, in this order:", style="bold"))
         for number, (about, warnings) in enumerate(there.items(), 1):
-            first = f"{number}. {about}: " if len(there) > 1 else "warning: "
-            for warning in dict.fromkeys(warnings):
-                self.print(Text(f"{first}{warning}"), soft_wrap=True)
+            for k, warning in enumerate(dict.fromkeys(warnings)):
+                first = f"{number}. {about}: " if k == 0 else "   "
+                self.print(Text(f"{first if len(there) > 1 else 'warning: '}{warning}"), soft_wrap=True)
         self.found["warnings"] = {**self.found.get("warnings", {}), **there}
 
     def show(self) -> None:

@@ -54,7 +54,7 @@ def print_servos(page: Page, fits: Mapping[str, ServoFit | str]) -> None:
     grid = new_table("", found)
     for name in SERVO_PARAMETERS:
         if any(name in fit.p for fit in found.values()):
-            cells = (_cell(fit, name) for fit in found.values())
+            cells = (value_of(fit, name) for fit in found.values())
             grid.add_row(f"{name} [{unit_of(next(iter(found.values())).servo, name)}]", *cells)
     laws = dict.fromkeys(LAWS[fit.servo.kind] for fit in found.values())
     print_titled(page, f"servos: torque = {', or '.join(laws)}, friction and armature at the joint", grid)
@@ -63,7 +63,7 @@ def print_servos(page: Page, fits: Mapping[str, ServoFit | str]) -> None:
             page.print(Text(f"{joint}: no estimate: {fit}"), soft_wrap=True)
 
 
-def _cell(fit: ServoFit, name: str) -> str:
+def value_of(fit: ServoFit, name: str) -> str:
     """Return a parameter with its standard error, or the factor that it is known up to."""
     if name not in fit.p:
         return ""

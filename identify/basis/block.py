@@ -98,7 +98,7 @@ class AbstractBlock(ABC):
     """Named columns of a robot, linear in its parameters, as the three models need them.
 
     Every function takes a state, signals of shape (..., joint, time), and returns the columns that are not identically
-    zero, (row of an instant, parameter) -> (..., time). For all states, with s = d/dt,
+    zero, (row of an instant, parameter) -> (..., time). A state may be a stretch of a motion. For all states, with s = d/dt,
 
         explicit = s momentum + remainder          qd' explicit = s energy + dissipation
 

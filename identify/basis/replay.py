@@ -15,7 +15,7 @@ PIECE = 8192
 """Samples of a piece: a call of NumPy takes 0.5 us beside what it does. A quarter of it takes a third longer (PUMA 560), all of
 a long log at once twice as long."""
 
-FUNCTIONS: dict[str, Any] = {name: function for function, name in OPERATIONS.items()}
+FUNCTIONS: dict[str, Any] = {name: function for function, name in OPERATIONS.items()}  # links choose nothing: no `where`
 """Operations of a tape -> what they are of arrays."""
 
 

@@ -84,7 +84,7 @@ class Symbol:
         return self.tape.apply("negate", self)
 
     def __array_ufunc__(self, function: Any, method: str, *of: "Value") -> "Value":
-        return self.tape.apply(OPERATIONS[function], *of) if method == "__call__" else NotImplemented
+        return self.tape.apply(OPERATIONS[function], *of) if method == "__call__" and function in OPERATIONS else NotImplemented
 
 
 Value: TypeAlias = Symbol | float

@@ -58,7 +58,7 @@ class State:
         return self.s(self.qd)
 
     def part(self, samples: slice) -> Self:
-        """Return the motion at some samples, with the velocities and accelerations that it has there."""
+        """Return the motion at some samples, with its velocities and accelerations there; its `s` knows no others."""
         conditions = {name: x[..., samples] for name, x in self.conditions.items()}
         return replace(
             self, q=self.q[..., samples], qd=self.qd[..., samples], s=lambda _: self.qdd[..., samples], conditions=conditions

@@ -2,7 +2,7 @@
 
     uv run --group benchmark python tests/benchmarks/peers/mujoco_tool.py runs/simulated/scara-*-[0-2]
 
-It starts 30 % off and simulates windows of 5 s, as in tests/benchmarks/output_error.py. Torques of the held-out logs, by the
+It starts 30 % off and simulates windows of 2 s, as in tests/benchmarks/output_error.py. Torques of the held-out logs, by the
 columns of the SCARA, go into predicted-mujoco.npz.
 """
 
@@ -21,7 +21,7 @@ from idbench.sim.robot.robot import Robot
 from idbench.sim.robot.scara import scara_truth
 
 FILE = runpy.run_path(str(Path(__file__).parent.parent / "output_error.py"))
-OUTPUT_ERROR, SETTING = FILE["output_error"], FILE["SETTINGS"]["mujoco.sysid, 5 s"]
+OUTPUT_ERROR, SETTING = FILE["output_error"], FILE["SETTINGS"]["mujoco.sysid, filtered"]
 NOTE = "output error, start 30 % off, windows of 2 s, at 100 Hz"
 
 RATE = 100.0
