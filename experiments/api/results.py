@@ -268,13 +268,8 @@ class Identification:
     def _rows(self) -> Iterator[list[str]]:
         functions = {p.name for p in self.fit.basis.parameters if p.is_random_effect}
         for p in (p for p in self.parameters.values() if p.name not in functions):
-            yield [
-                p.name,
-                concise(p.value, p.sigma),
-                p.unit,
-                relative(p.value, p.sigma),
-                *([] if p.truth is None else [f"{p.truth:.6g}"]),
-            ]
+            truth = [] if p.truth is None else [f"{p.truth:.6g}"]
+            yield [p.name, concise(p.value, p.sigma), p.unit, relative(p.value, p.sigma), *truth]
 
 
 @final
