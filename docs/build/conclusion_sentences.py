@@ -59,7 +59,7 @@ def _on_models() -> Iterator[Finding]:
     """Yield the sentences on models and windows: the paper's in our words, what was found, the command."""
     yield (
         "The implicit model has no advantage over the explicit one.",
-        f"**Holds to 5 %.** Its errors are {_span('implicit', 'explicit')} times the explicit model's; "
+        f"**Holds.** Its errors are {_span('implicit', 'explicit')} times the explicit model's; "
         "below 1 with the paper's prefilter alone.",
         "study models",
     )

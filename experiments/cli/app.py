@@ -120,7 +120,7 @@ def completion(shell: str) -> str:
     script = StringIO()
     with redirect_stdout(script), suppress(SystemExit):  # the parser ends its process after the script
         _together().cli(prog="idbench", args=["--tyro-print-completion", shell])
-    return script.getvalue()
+    return script.getvalue().replace("complete -F ", "complete -o default -F ")  # files, where bash has no words
 
 
 def command(name: str) -> Callable[[type], type]:

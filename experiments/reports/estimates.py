@@ -7,10 +7,11 @@ from math import isfinite
 
 import numpy as np
 
+from idbench.experiments.identification.causes import Cause
 from idbench.experiments.identification.fit import Fit
 from idbench.experiments.judgement.held_out import HeldOut
 from idbench.experiments.judgement.judgement import Judgement
-from idbench.experiments.judgement.warnings import FLAGS, doubtful, used
+from idbench.experiments.judgement.warnings import FLAGS, LOG, doubtful, used
 from idbench.experiments.text import WORTHLESS, error_percentage, number, percent, relative
 from idbench.identify import Estimate
 from idbench.identify.arrays import Array
@@ -150,12 +151,16 @@ def explained(share: Array) -> str:
 
 
 def conclusion(judgement: Judgement, warnings: Mapping[str, Sequence[str]]) -> tuple[str, str]:
-    """Return one sentence on the hardest held-out log, and the next step."""
-    first = next((about for about, found in warnings.items() if found), "")
-    return _found(judgement.hardest), _next(judgement, first)
+    """Return one sentence on the hardest held-out log, and the next step.
+
+    What is wrong with the log, and has an option that mends it, comes before mistakes of the model: it may cause them.
+    """
+    of_log = next((warning for warning in warnings.get(LOG, ()) if "--" in warning), "")
+    first = next((found[0] for found in warnings.values() if found), "")
+    return _found(judgement.hardest, [] if of_log else judgement.fit.diagnosis or []), _next(judgement, of_log, first)
 
 
-def _found(one: HeldOut | None) -> str:
+def _found(one: HeldOut | None, causes: Sequence[Cause]) -> str:
     if one is None:
         return "Result: not validated"
     model = leading({name: validation.rms for name, validation in one.torques.items()})
@@ -164,7 +169,7 @@ def _found(one: HeldOut | None) -> str:
     if wrong:
         return f"Result: {word} ({model} model): {wrong[0].partition(':')[0]}"
     found = f"Result: {word} ({model} model), torque errors of at most {error_percentage(worst)} on {_short(one.title)}"
-    return "; ".join([found, *(cause.words for cause in one.causes[:1])])
+    return "; ".join([found, *(cause.words for cause in causes[:1])])
 
 
 def _short(title: str) -> str:
@@ -172,12 +177,14 @@ def _short(title: str) -> str:
     return title.partition(", by a fit of the rest")[0]
 
 
-def _next(judgement: Judgement, first: str) -> str:
-    """Return what to do: what mends the first mistake that the fit shows, and was proved to, else what is suspicious."""
+def _next(judgement: Judgement, of_log: str, first: str) -> str:
+    """Return what to do: about the log, then what mends the first mistake and was proved to, else the first doubt."""
+    if of_log:
+        return f"next: {of_log}"
     for cause in judgement.fit.diagnosis or ():
         return f"next: {cause.mends}"
     if first:
-        return f"next: check {first}"
+        return f"next: {first}"
     if judgement.good:
         return "next: --write arm.urdf arm.json arm.py keeps the robot"
     if judgement.fit.logs.fitted[0].poses:

@@ -28,7 +28,7 @@ def with_units(layout: LogLayout, table: LogTable) -> tuple[LogLayout, list[str]
         stated = named_unit(name, source.logged[0])
         unit = stated or _suspected(name, layout, table)
         if unit and not stated and unit != SI[name]:
-            doubts.append(f"{name} in {unit}? Its values, or names, look like it")
+            doubts.append(f"{name} in {unit}? Its values, or names, look like it: identify needs --units {name}={unit}")
         layout = layout.where(name, replace(source, unit=unit))
     if not layout.t.columns:
         doubts.append("no column of times: state fs = ... [Hz] in [t]")

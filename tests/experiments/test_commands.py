@@ -158,12 +158,30 @@ def test_a_header_may_have_spaces_and_quotes_and_velocities(csv):
 
 def test_the_first_lines_say_what_to_check_first_and_models_alike_are_one(csv, capsys):
     """Of a log whose delay is wrong by 3 ms."""
-    assert main(["identify", str(csv), "--torque", "held", "--torque-delay", "0.003", "-v"]) == 0
+    assert main(["identify", str(csv), "--torque", "held", "--torque-delay", "0.003", "-v", "--robot", "scara"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[0].startswith("Result: ")
     assert re.search(r"all torques: torque late by 0\.00301\d*\(\d+\) s", lines[0])
     assert lines[1] == "next: --torque-delay estimate"
     assert any(line.startswith("explicit: ") and line.endswith(" (implicit: the same)") for line in lines)
+
+
+def test_what_is_wrong_with_the_log_comes_before_mistakes_of_the_model(csv, capsys):
+    def in_degrees(lines):
+        rows = [[float(x) for x in line.split(",")] for line in lines[1:]]
+        return [lines[0], *(",".join(f"{x * (57.29578 if 1 <= k <= 2 else 1):.9g}" for k, x in enumerate(row)) for row in rows)]
+
+    rewritten(csv, in_degrees)
+    assert main(["identify", str(csv), "--torque", "held", "--robot", "scara"]) == 0
+    first, then, *_ = capsys.readouterr().out.splitlines()
+    assert first.startswith("Result: poor")
+    assert ";" not in first
+    assert "--units q=deg" in then
+
+
+def test_a_robot_that_nobody_names_is_named(csv, capsys):
+    assert main(["identify", str(csv), "--torque", "held"]) == 0
+    assert "no --robot was given, the shipped scara is assumed" in capsys.readouterr().out
 
 
 def test_a_log_with_a_gap_is_resampled_by_the_command_that_is_told(csv, tmp_path, complaint, monkeypatch):

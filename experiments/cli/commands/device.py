@@ -29,6 +29,8 @@ def device(options: ShowDevice) -> None:
         return
     page.found |= device_of(options.name)
     _print(page, options.name)
+    if options.robot:
+        Robot.load(absolute(options.robot))  # before anything is written
     if options.write_mjcf is not None:
         robot = absolute(options.robot or BENCH)
         names = Robot.load(robot).joints

@@ -16,7 +16,9 @@ from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.fit import Fit
 from idbench.experiments.identification.job import files_of, fit_of, loaded_logs, notes_of, read_options, request_of, summary_of
 from idbench.experiments.identification.logs import sought_of
+from idbench.experiments.identification.reading import stated_by
 from idbench.experiments.identification.request import Request
+from idbench.experiments.identification.robot_model import SCARA
 from idbench.experiments.judgement.judgement import Judgement, judge
 from idbench.experiments.judgement.remedies import checks
 from idbench.experiments.recording.audience import Audience
@@ -30,6 +32,8 @@ from idbench.identify.files.log_file import write_log
 
 COLORS = {"good": "green", "fair": "yellow", "poor": "red"}
 """Of the verdicts."""
+
+ASSUMED = f"no --robot was given, the shipped {SCARA} is assumed"
 
 LEFT_OUT = ("out", "force", "json", "watching", "write", "write_mjcf", "follow", "verbose")
 """Options that make no difference to an identification."""
@@ -65,7 +69,7 @@ def identify(options: Identify) -> None:
                 _show_fit(page, result, options, whole_models)
                 raise
             if judgement is not None:
-                _show_answer(page, judgement, warnings)
+                _show_answer(page, judgement, warnings, options)
             _show_fit(page, result, options, whole_models)
             if judgement is None:
                 return
@@ -80,6 +84,11 @@ def identify(options: Identify) -> None:
             view_all(Shown(page, options, command, judgement, warnings, folder, audience), attempts)
 
 
+def _assumes_the_robot(options: Identify) -> bool:
+    """Return whether neither an option nor the log says of which robot it is."""
+    return options.robot is None and "robot" not in stated_by(options.log[0])
+
+
 def _checked(judgement: Judgement, options: Identify, attempts: Attempts) -> Mapping[str, Sequence[str]]:
     """Return what to check first."""
     with stages_of("checking"):
@@ -87,9 +96,13 @@ def _checked(judgement: Judgement, options: Identify, attempts: Attempts) -> Map
         return attempts.attempt("the checks", lambda: checks(judgement, delay=delay, trials=not options.no_trials)) or {}
 
 
-def _show_answer(page: Page, judgement: Judgement, warnings: Mapping[str, Sequence[str]]) -> None:
+def _show_answer(page: Page, judgement: Judgement, warnings: Mapping[str, Sequence[str]], options: Identify) -> None:
     """Show the verdict, and what to do next."""
     verdict, step = conclusion(judgement, warnings)
+    if verdict.startswith("Result: poor") and _assumes_the_robot(options):
+        step = f"next: {ASSUMED}: --robot FILE names another"
+    elif judgement.good and options.write:
+        step = "next: docs/exports.md says how the written files are used"
     page.print(Text(verdict, f"bold {COLORS.get(verdict.split()[1], '')}".strip()), soft_wrap=True)
     page.print(Text(f"{step}\n", "bold"), soft_wrap=True)
 
@@ -116,7 +129,7 @@ def _followed(stack: ExitStack, options: Identify, request: Request, audience: A
 def _show_fit(page: Page, result: Fit, options: Identify, whole: tuple[str, ...]) -> None:
     """Show the estimates."""
     print_fit(page, result, ", ".join(map(str, options.log)), whole, verbose=options.verbose)
-    for note in notes_of(result):
+    for note in (*notes_of(result), *([ASSUMED] if _assumes_the_robot(options) else [])):
         page.print(Text(note), soft_wrap=True)
     page.show()
 

@@ -177,6 +177,8 @@ class Completion(Command, action="completion:complete"):
     """Print a script for a shell, which then completes commands and options with the tab key.
 
     bash: idbench completion bash > ~/.local/share/bash-completion/completions/idbench
+
+    It completes the word idbench: in a clone, activate .venv first.
     """
 
     shell: Annotated[Literal["bash", "zsh", "fish"], Word(positional=True)]
