@@ -143,7 +143,7 @@ class LogClock:
                 f"{1 / max(self.roughness['rows'], 1e-300):.2g} times smoother so"
             )
         if self.filled:
-            yield f"samples never logged, or left out: {self.filled}, filled in between their neighbours; held torques are averaged"
+            yield f"samples never logged, or left out: {self.filled}, filled in by their neighbours; held torques are averaged"
         for start, length in self.gaps:
             yield f"nothing was logged for {length:.3g} s after t = {start:.4g} s: the log is cut there"
 
