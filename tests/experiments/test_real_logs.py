@@ -240,7 +240,11 @@ def test_the_report_says_in_a_minute_whether_to_trust_it(idbench, logs, tmp_path
     page = (tmp_path / "out" / "report.html").read_text()
     for words in ("explicit", "Check these first", "held-out log", "--torque-delay", "XX", "Friction", "residuals"):
         assert words in page, words
-    assert page.count('<svg class="curves"') == 6  # the delay that was stated is wrong: what it explains is shown, too
+    # Torques, residuals, friction and spectra of six joints, and what the wrong delay explains.
+    assert page.count('<div class="panels">') == 5
+    assert page.count('<svg class="curves"') == 25
+    parameters = json.loads((tmp_path / "out" / "summary.json").read_text())["parameters"]
+    assert page.count('<svg class="interval"') == len(parameters)
     assert 'src="http' not in page
     assert "<link" not in page
     assert f"--validate {logs / 'second.parquet'}" in page
