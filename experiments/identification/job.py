@@ -92,6 +92,11 @@ def robot_of(asked: IdentifyRequest) -> str:
     return str(stated_by(asked.log[0]).get("robot", SCARA)) if asked.robot is None else absolute(asked.robot)
 
 
+def assumes_the_robot(asked: IdentifyRequest) -> bool:
+    """Return whether nobody says of which robot the log is: neither a request nor the folder of a run."""
+    return asked.robot is None and "robot" not in stated_by(asked.log[0])
+
+
 def read_logs(asked: IdentifyRequest, request: Request) -> Loaded:
     """Return the logs of the fit, and the request with the band that suits them."""
     return load(asked.log, read_options(asked), request, band=chooses_band(asked))

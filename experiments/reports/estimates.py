@@ -9,7 +9,7 @@ import numpy as np
 
 from idbench.experiments.identification.causes import Cause
 from idbench.experiments.identification.fit import Fit
-from idbench.experiments.judgement.held_out import HeldOut
+from idbench.experiments.judgement.held_out import HeldOut, Verdict
 from idbench.experiments.judgement.judgement import Judgement
 from idbench.experiments.judgement.warnings import FLAGS, LOG, doubtful, used
 from idbench.experiments.text import WORTHLESS, error_percentage, number, percent, relative
@@ -157,18 +157,28 @@ def conclusion(judgement: Judgement, warnings: Mapping[str, Sequence[str]]) -> t
     """
     of_log = next((warning for warning in warnings.get(LOG, ()) if "--" in warning), "")
     first = next((found[0] for found in warnings.values() if found), "")
-    return _found(judgement.hardest, [] if of_log else judgement.fit.diagnosis or []), _next(judgement, of_log, first)
+    return _found(judgement, [] if of_log else judgement.fit.diagnosis or []), _next(judgement, of_log, first)
 
 
-def _found(one: HeldOut | None, causes: Sequence[Cause]) -> str:
-    if one is None:
+def verdict_on(judgement: Judgement) -> Verdict | None:
+    """Return the verdict on the model that predicts the hardest held-out log best; None if there is no such log."""
+    one = judgement.hardest
+    return None if one is None else one.verdicts[_best_model(one)]
+
+
+def _best_model(one: HeldOut) -> str:
+    return leading({name: validation.rms for name, validation in one.torques.items()})
+
+
+def _found(judgement: Judgement, causes: Sequence[Cause]) -> str:
+    one, verdict = judgement.hardest, verdict_on(judgement)
+    if one is None or verdict is None:
         return "Result: not validated"
-    model = leading({name: validation.rms for name, validation in one.torques.items()})
+    model = _best_model(one)
+    if verdict.wrong:
+        return f"Result: {verdict.word} ({model} model): {verdict.wrong[0].partition(':')[0]}"
     worst = float(np.nanmax(np.nan_to_num(one.torques[model].percent, nan=0.0, posinf=np.inf)))
-    word, wrong = one.verdicts[model].word, one.verdicts[model].wrong
-    if wrong:
-        return f"Result: {word} ({model} model): {wrong[0].partition(':')[0]}"
-    found = f"Result: {word} ({model} model), torque errors of at most {error_percentage(worst)} on {_short(one.title)}"
+    found = f"Result: {verdict.word} ({model} model), torque errors of at most {error_percentage(worst)} on {_short(one.title)}"
     return "; ".join([found, *(cause.words for cause in causes[:1])])
 
 

@@ -13,7 +13,7 @@ from idbench.experiments.identification.fit import Fit
 from idbench.experiments.judgement.held_out import HeldOut
 from idbench.experiments.judgement.judgement import Judgement, Unjudged
 from idbench.experiments.judgement.warnings import FLAGS, doubtful, used
-from idbench.experiments.reports.estimates import conclusion, leading
+from idbench.experiments.reports.estimates import conclusion, leading, verdict_on
 from idbench.experiments.reports.figures import (
     causes_figure,
     color_of,
@@ -42,49 +42,62 @@ def report(
 
     A figure that fails is noted in `attempts`, and missing.
     """
-    fit, hardest = judgement.fit, judgement.hardest
-    robot_model = fit.robot_model
-    rows = list(parameter_rows(fit))
-    marks, lead = doubtful(fit), fit.estimates[fit.leading]
-    verdict, step = conclusion(judgement, warnings)
+    fit, robot_model = judgement.fit, judgement.fit.robot_model
     cutoff = getattr(fit.processing.operator, "cutoff", None)
     return rendered(
         "idbench.experiments.reports",
         "identify.html.j2",
         title=f"{robot_model.tree.name}: {fit.logs.title}",
         subtitle=f"{robot_model.tree.n} joints, {len(fit.basis.names)} parameters, {fit.request.estimator}",
-        verdicts=[] if hardest is None else list(_verdicts(hardest)),
-        unjudged="; ".join(one.why for one in judgement.on if isinstance(one, Unjudged)),
-        failures=fit.failures,
         warnings={about: messages for about, messages in warnings.items() if messages},
+        **_of_judgement(judgement, warnings, attempts),
+        **_of_estimates(fit),
         causes=_figure(attempts, "causes", causes_figure, fit),
-        unseen=[_held_out(one, attempts) for one in judgement.held_out],
-        verdict=verdict,
-        word=verdict.split()[1] if hardest else "unsure",
-        step=step,
-        models=[(model, color_of(model)) for model in fit.estimates],
-        leading=fit.leading,
-        filed="true value" if fit.truth else "robot's file",
-        parameters=[(link, list(each)) for link, each in groupby(rows, lambda row: row.link)],
-        legend="; ".join(f"{flag} {FLAGS[flag]}" for flag in used({fit.leading: marks[fit.leading]})),
-        correlated=correlated(lead)[:LONGEST],
-        limits=[(cause, percentage(share), name, percentage(most)) for cause, share, name, most in error_shares(lead)],
-        torque_limits=[] if hardest is None else list(_torque_errors(hardest)),
-        ranges=list(_ranges(fit)),
-        today=date.today().isoformat(),
         friction=_figure(attempts, "friction", friction_figure, fit),
         spectra=_figure(attempts, "spectra", spectra_figure, fit),
         joints=robot_model.robot.joints,
         force=", ".join(dict.fromkeys(robot_model.units(j)[0] for j in range(fit.basis.n))),
         logs=list(_logs(fit)),
+        ranges=list(_ranges(fit)),
         notes=notes,
         command=command,
+        today=date.today().isoformat(),
         version=version("idbench"),
         robot=robot_model.name,
         chain=fit.request.chain,
         cutoff="" if cutoff is None else f"{cutoff:g} Hz",
         estimator=fit.request.estimator,
     )
+
+
+def _of_judgement(judgement: Judgement, warnings: Mapping[str, Sequence[str]], attempts: Attempts) -> dict[str, Any]:
+    """Return verdict, next step, and the held-out logs."""
+    hardest, on_best = judgement.hardest, verdict_on(judgement)
+    verdict, step = conclusion(judgement, warnings)
+    return {
+        "verdict": verdict,
+        "step": step,
+        "word": on_best.word if on_best else "unsure",
+        "verdicts": [] if hardest is None else list(_verdicts(hardest)),
+        "unjudged": "; ".join(one.why for one in judgement.on if isinstance(one, Unjudged)),
+        "failures": judgement.fit.failures,
+        "unseen": [_held_out(one, attempts) for one in judgement.held_out],
+        "torque_limits": [] if hardest is None else list(_torque_errors(hardest)),
+    }
+
+
+def _of_estimates(fit: Fit) -> dict[str, Any]:
+    """Return the table of parameters, and what limits them."""
+    lead, marks = fit.estimates[fit.leading], doubtful(fit)[fit.leading]
+    return {
+        "models": [(model, color_of(model)) for model in fit.estimates],
+        "leading": fit.leading,
+        "filed": "true value" if fit.truth else "robot's file",
+        "parameters": [(link, list(rows)) for link, rows in groupby(parameter_rows(fit), lambda row: row.link)],
+        "legend": "; ".join(f"{flag} {FLAGS[flag]}" for flag in used({fit.leading: marks})),
+        "correlated": correlated(lead)[:LONGEST],
+        "limits": [(cause, percentage(share), name, percentage(most)) for cause, share, name, most in error_shares(lead)],
+    }
 
 
 def _figure(attempts: Attempts, name: str, draw: Callable[[T], str], shown: T) -> str:

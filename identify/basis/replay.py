@@ -6,7 +6,7 @@ from typing import Any, Generic, NamedTuple, TypeVar, final
 import numpy as np
 
 from idbench.identify.arrays import Array
-from idbench.identify.basis.tape import OPERATIONS, Symbol, Tape, Value
+from idbench.identify.basis.tape import NUMBERS, Symbol, Tape, Value
 from idbench.identify.signals.signals import State
 
 Key = TypeVar("Key", bound=Hashable)
@@ -14,9 +14,6 @@ Key = TypeVar("Key", bound=Hashable)
 PIECE = 8192
 """Samples of a piece: a call of NumPy takes 0.5 us beside what it does. A quarter of it takes a third longer (PUMA 560), all of
 a long log at once twice as long."""
-
-FUNCTIONS: dict[str, Any] = {name: function for function, name in OPERATIONS.items()}  # links choose nothing: no `where`
-"""Operations of a tape -> what they are of arrays."""
 
 
 class RecordedSignal:
@@ -108,7 +105,7 @@ class Program(Generic[Key]):
                     free.append(kept + self._scratch)
                     self._scratch += 1
                 places[number] = free.pop()
-            steps.append((FUNCTIONS[operation], given, places[number]))
+            steps.append((NUMBERS[operation], given, places[number]))
         self._constants, first = list(constants), kept + self._scratch
         self._steps = [
             _Step(function, [first + constants[x] if isinstance(x, float) else x for x in given], at)

@@ -14,15 +14,23 @@ from idbench.experiments.cli.commands.identify_views import Shown, require_layer
 from idbench.experiments.cli.options.jobs import Identify
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.fit import Fit
-from idbench.experiments.identification.job import files_of, fit_of, loaded_logs, notes_of, read_options, request_of, summary_of
+from idbench.experiments.identification.job import (
+    assumes_the_robot,
+    files_of,
+    fit_of,
+    loaded_logs,
+    notes_of,
+    read_options,
+    request_of,
+    summary_of,
+)
 from idbench.experiments.identification.logs import sought_of
-from idbench.experiments.identification.reading import stated_by
 from idbench.experiments.identification.request import Request
 from idbench.experiments.identification.robot_model import SCARA
 from idbench.experiments.judgement.judgement import Judgement, judge
 from idbench.experiments.judgement.remedies import checks
 from idbench.experiments.recording.audience import Audience
-from idbench.experiments.reports.estimates import conclusion, shown_whole
+from idbench.experiments.reports.estimates import conclusion, shown_whole, verdict_on
 from idbench.experiments.reports.printed import print_fit, print_held_out
 from idbench.experiments.results.attempts import Attempts
 from idbench.experiments.results.folder import ResultsFolder
@@ -84,11 +92,6 @@ def identify(options: Identify) -> None:
             view_all(Shown(page, options, command, judgement, warnings, folder, audience), attempts)
 
 
-def _assumes_the_robot(options: Identify) -> bool:
-    """Return whether neither an option nor the log says of which robot it is."""
-    return options.robot is None and "robot" not in stated_by(options.log[0])
-
-
 def _checked(judgement: Judgement, options: Identify, attempts: Attempts) -> Mapping[str, Sequence[str]]:
     """Return what to check first."""
     with stages_of("checking"):
@@ -98,12 +101,13 @@ def _checked(judgement: Judgement, options: Identify, attempts: Attempts) -> Map
 
 def _show_answer(page: Page, judgement: Judgement, warnings: Mapping[str, Sequence[str]], options: Identify) -> None:
     """Show the verdict, and what to do next."""
-    verdict, step = conclusion(judgement, warnings)
-    if verdict.startswith("Result: poor") and _assumes_the_robot(options):
+    (said, step), verdict = conclusion(judgement, warnings), verdict_on(judgement)
+    word = verdict.word if verdict else ""
+    if word == "poor" and assumes_the_robot(options):
         step = f"next: {ASSUMED}: --robot FILE names another"
     elif judgement.good and options.write:
         step = "next: docs/exports.md says how the written files are used"
-    page.print(Text(verdict, f"bold {COLORS.get(verdict.split()[1], '')}".strip()), soft_wrap=True)
+    page.print(Text(said, f"bold {COLORS.get(word, '')}".strip()), soft_wrap=True)
     page.print(Text(f"{step}\n", "bold"), soft_wrap=True)
 
 
@@ -129,7 +133,7 @@ def _followed(stack: ExitStack, options: Identify, request: Request, audience: A
 def _show_fit(page: Page, result: Fit, options: Identify, whole: tuple[str, ...]) -> None:
     """Show the estimates."""
     print_fit(page, result, ", ".join(map(str, options.log)), whole, verbose=options.verbose)
-    for note in (*notes_of(result), *([ASSUMED] if _assumes_the_robot(options) else [])):
+    for note in (*notes_of(result), *([ASSUMED] if assumes_the_robot(options) else [])):
         page.print(Text(note), soft_wrap=True)
     page.show()
 

@@ -12,6 +12,7 @@ from idbench.experiments.cli.commands.inner import doubt_window, recording_of, r
 from idbench.experiments.cli.options.jobs import RunCommand
 from idbench.experiments.cli.saving import Files, saved, write_scenario
 from idbench.experiments.identification.log_warnings import warnings_of_log
+from idbench.experiments.identification.robot_model import SCARA
 from idbench.experiments.identification.scenario_run import ScenarioRun
 from idbench.experiments.judgement.warnings import FILE, LOG, warnings_of_robot
 from idbench.experiments.plugin_tables import plugin_conflicts
@@ -76,7 +77,7 @@ def _as_servos(scenario: Scenario, out: Path) -> str:
 
 def _print_run(page: Page, ran: ScenarioRun, *, verbose: bool) -> None:
     """Print the estimates, of the paper's robot those of all models, and what to check."""
-    whole = shown_whole(ran.fit, asked=ran.scenario.robot == "scara")
+    whole = shown_whole(ran.fit, asked=ran.scenario.robot == SCARA)
     print_fit(page, ran.fit, f"Scenario {ran.scenario.name}", whole, verbose=verbose)
     if ran.rejection is not None:
         page.print(Text(ran.rejection.words(ran.run.robots[0].joints, ran.scenario.wdyn)), soft_wrap=True)
