@@ -91,8 +91,11 @@ class IncrementalEncoder(AbstractEncoder):
         """Return the encoders, their random events drawn."""
         if self.missed_counts > fs:
             raise ScenarioError(f"encoder.missed_counts = {self.missed_counts:g} 1/s must be at most fs = {fs:g} Hz")
-        noise = np.stack([self.noise * rng.standard_normal((samples, n)) for rng in rngs], axis=1)
-        missed = np.stack([(rng.random((samples, n)) < self.missed_counts / fs).astype(np.float64) for rng in rngs], axis=1)
+        noise = missed = np.zeros((samples, 1, 1))
+        if self.noise or self.missed_counts:
+            noise = np.stack([self.noise * rng.standard_normal((samples, n)) for rng in rngs], axis=1)
+        if self.missed_counts:
+            missed = np.stack([(rng.random((samples, n)) < self.missed_counts / fs).astype(np.float64) for rng in rngs], axis=1)
         return _Reader(self, per_joint(self.lines, n, "encoder.lines"), noise, missed)
 
     def spread(self, n: int) -> Array:
@@ -111,16 +114,19 @@ class _Reader(AbstractReader):
         self._lost = np.zeros(noise.shape[1:])
 
     def read(self, k: int, q: Array) -> Array:
-        counts = self._count(q + self._noise[k])
+        counts = self._count(q + self._noise[k] if self._settings.noise else q)
+        if not self._settings.missed_counts:
+            return counts / self._counts_per_rad
         if self._before is not None:
             self._lost = self._lost + np.sign(counts - self._before) * self._missed[k]
         self._before = counts
         return (counts - self._lost) / self._counts_per_rad
 
     def _count(self, q: Array) -> Array:
-        period = self._settings.quadrature
+        period, error = self._settings.quadrature, self._settings.interpolation_error
         x = q * self._counts_per_rad
-        x = x + period * self._settings.interpolation_error * np.sin(2 * np.pi / period * x)
+        if error:
+            x = x + period * error * np.sin(2 * np.pi / period * x)
         return np.floor(x + self._settings.offset)
 
 

@@ -33,7 +33,7 @@ ALLOWED_IN = {
     "identify/files/log_file.py": {"pyarrow"},
     "identify/files/ros_bag.py": {"rosbags"},
     "identify/telling.py": {"threadpoolctl"},
-    "identify/servo/servo_step.py": {"numba"},
+    "identify/compiled.py": {"numba"},
     "sim/scenario/scenario_file.py": {"tomli_w"},
     "sim/trajectories/recorded.py": {"scipy"},
     "experiments/recording/columns.py": {"pyarrow"},

@@ -50,7 +50,7 @@ def noise_spectra(problem: Problem, levels: NoiseLevels, f: Array) -> tuple[Arra
         )
     )
     moving = (signals.weight[:, None, some] > 0).astype(np.float64)
-    inertia, damping, stiffness = problem.parts[0].linear.at(some)
+    inertia, damping, stiffness = problem.parts[0].linear.at(np.arange(signals.state.q.shape[-1], dtype=np.float64)[some])
 
     def mean(x: Array) -> Array:
         """Return the mean of x, shape (joint, joint, time), where joints move, times the squared noise of each position."""

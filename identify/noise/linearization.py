@@ -6,12 +6,11 @@ from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from idbench.identify.arrays import HELD, Array, combined, frozen
 from idbench.identify.basis.basis import Basis
 from idbench.identify.basis.newton_euler import momenta, torques
-from idbench.identify.signals.filters import slide
+from idbench.identify.signals.filters import between_samples, slide
 from idbench.identify.signals.signals import Signals, State
 from idbench.identify.signals.spectra import parabola
 
@@ -58,9 +57,8 @@ class Linearization:
     X: Array
     """Its parameters, shape (..., p)."""
 
-    def at(self, some: slice) -> Slopes:
-        """Return the slopes at some samples."""
-        places = np.arange(some.start or 0, self.signals.state.q.shape[-1], some.step or 1)
+    def at(self, places: Array) -> Slopes:
+        """Return the slopes at places [samples], which may lie between samples."""
         return Slopes(*(_between(x, places, self._every) for x in self._at_knots))
 
     @property
@@ -140,12 +138,13 @@ def smoothed(x: Array, fs: float) -> Array:
     return slide(x, _parabola(window)) if window > 3 else x
 
 
-def _between(x: Array, places: npt.NDArray[np.intp], every: int) -> Array:
+def _between(x: Array, places: Array, every: int) -> Array:
     """Return values of every so many samples, shape (..., knot), at places [samples], by cubics through four neighbours."""
     if every == 1:
-        return x[..., places]
+        return between_samples(x, places)
     ends = np.concatenate([x[..., :1], x, x[..., -1:], x[..., -1:]], axis=-1)
-    first, s = places // every, (places % every) / every
+    first = (places // every).astype(np.intp)
+    s = places / every - first
     weights = -s * (1 - s) ** 2 / 2, 1 - (5 - 3 * s) * s**2 / 2, s * (1 + (4 - 3 * s) * s) / 2, -(s**2) * (1 - s) / 2
     total: Array = sum(w * ends[..., first + i] for i, w in enumerate(weights))
     return total

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from math import ceil
+from math import ceil, floor
 
 import numpy as np
 
@@ -11,10 +11,10 @@ from idbench.identify.arrays import Array
 from idbench.identify.noise.covariance import BandedCovariance
 from idbench.identify.noise.linearization import Linearization, smoothed
 from idbench.identify.rows.row_map import Grid, RowMap
-from idbench.identify.signals.filters import CentralDifference
+from idbench.identify.signals.filters import CentralDifference, between_samples
 
-RATE, EDGES = 50.0, 200.0
-"""Least frequencies [Hz] at which noise is propagated: rows and motion have little beyond some 10 Hz, edges of masks more."""
+RATE = 50.0
+"""Least frequency [Hz] at which noise is propagated: rows and motion have little beyond some 10 Hz."""
 
 ALIASED = 0.01
 """Share of a variance by which it may be off for being summed at few samples: 0.5 % of sigma."""
@@ -90,11 +90,11 @@ def torque_paths(rows: RowMap) -> Paths:
     over the little that they look at.
     """
     signals = rows.signals
-    windows, grid, some = _thinned([signals.torque_adjoint(np.pad(rows.response, signals.reach))], rows)
-    inside = rows.inside[..., some]
+    windows, grid, places, _ = _thinned([signals.torque_adjoint(np.pad(rows.response, signals.reach))], rows)
+    inside = between_samples(rows.inside, places)
     torques = np.zeros((*inside.shape[:-1], signals.log.n, inside.shape[-1]))
     for (row, joint), B in rows.B.items():
-        factor = B if isinstance(B, float) else signals.torque.average(B)[..., some]
+        factor = B if isinstance(B, float) else between_samples(signals.torque.average(B), places)
         torques[..., row, joint, :] = inside[..., row, :] * factor
     return Paths(grid, windows, [torques], rows.outside)
 
@@ -107,13 +107,13 @@ def position_paths(rows: RowMap, linear: Linearization) -> Paths:
 
         h w B (M s^2 + D s + K) n -> [h'' w B M + h' (2 (w B M)' - w B D) + h ((w B M)'' - (w B D)' + w B K)] n
     """
-    windows, grid, some = _thinned(_responses(rows), rows)
-    M, D, K = linear.at(some)
-    s = partial(CentralDifference(spacing=some.step / rows.signals.fs).derivative, fs=rows.signals.fs / some.step)
+    windows, grid, places, rate = _thinned(_responses(rows), rows)
+    M, D, K = linear.at(places)
+    s = partial(CentralDifference(spacing=1 / rate).derivative, fs=rate)
     M_rate, D_rate = s(M), s(D)
     M_bend = s(M_rate)
     inertia, damping, stiffness = (np.zeros((*M.shape[:-3], rows.outside.shape[-2], *M.shape[-2:])) for _ in range(3))
-    for row, joint, u, rate, bend in _multipliers(rows, some):
+    for row, joint, u, rate, bend in _multipliers(rows, places):
         of_M, of_D, of_K = (x[..., joint, :, :] for x in (M, D, K))
         inertia[..., row, :, :] += u * of_M
         damping[..., row, :, :] += u * (of_D - 2 * M_rate[..., joint, :, :]) - 2 * rate * of_M
@@ -122,42 +122,59 @@ def position_paths(rows: RowMap, linear: Linearization) -> Paths:
     return Paths(grid, windows, [stiffness, damping, inertia], rows.outside)
 
 
-def _multipliers(rows: RowMap, some: slice) -> Iterator[tuple[int, int, Array, Array, Array]]:
-    """Yield row, joint, w B at some samples and its two derivatives, by the product rule.
+def _multipliers(rows: RowMap, places: Array) -> Iterator[tuple[int, int, Array, Array, Array]]:
+    """Yield row, joint, w B at places [samples] and its two derivatives, by the product rule.
 
-    Those of w are made of all samples, since the edges of a mask are sharp. B may be a measured velocity: it is smoothed, as in
+    B may be a measured velocity: it is smoothed, as in
     the linearization, or the derivatives would be those of its own noise.
     """
     fs = rows.signals.fs
     s = partial(CentralDifference(spacing=1 / fs).derivative, fs=fs)
-    weights = [rows.inside]
-    for _ in range(2):
-        weights.append(s(weights[-1]))
+    weights = _edges(rows)
     for (row, joint), B in rows.B.items():
-        w, w1, w2 = (x[..., row, None, some] for x in weights)
+        w, w1, w2 = (between_samples(x[..., row, None, :], places) for x in weights)
         slow = [] if isinstance(B, float) else [smoothed(B, fs)]
-        factors = [x[..., None, some] for x in (*slow, *map(s, slow), *map(s, map(s, slow)))]
+        factors = [between_samples(x[..., None, :], places) for x in (*slow, *map(s, slow), *map(s, map(s, slow)))]
         B0, B1, B2 = factors or (B, 0.0, 0.0)
         yield row, joint, w * B0, w1 * B0 + w * B1, w2 * B0 + 2 * w1 * B1 + w * B2
 
 
-def _thinned(windows: Sequence[Array], rows: RowMap) -> tuple[list[Array], Grid, slice]:
-    """Return windows at as few samples as sums of their products need, as weights; the rows among these; and which they are.
+def _thinned(windows: Sequence[Array], rows: RowMap) -> tuple[list[Array], Grid, Array, float]:
+    """Return windows at as few places as sums of their products need, as weights; the rows among these; places, and rate [Hz].
 
-    A low-pass at 5 Hz needs far fewer than a log of 1 kHz has.
+    A low-pass at 5 Hz needs far fewer than a log of 1 kHz has. Places divide the time from a row to the next, so that all rows
+    have the same window; they may lie between samples [samples].
     """
     fs, grid = rows.signals.fs, rows.grid
     windows = _without_tails(windows, grid.first)
-    middle = (len(windows[0]) - 1) // 2
+    before, samples = (len(windows[0]) - 1) // 2, rows.inside.shape[-1]
     H = np.stack(windows)
-    full, least = np.matmul(H, H.T), max(1, int(fs / (RATE if (rows.inside == 1).all() else EDGES)))
+    full = np.matmul(H, H.T)
     size = ALIASED * np.sqrt(np.outer(np.diag(full), np.diag(full)))
-    for step in [d for d in range(least, 1, -1) if grid.step % d == 0]:
-        thin = H[:, middle % step :: step]
-        if (np.abs(step * np.matmul(thin, thin.T) - full) <= size).all():
-            coarse = Grid(grid.first // step, grid.step // step, grid.count)
-            return list(np.sqrt(step) * thin), coarse, slice(grid.first % step, None, step)
-    return windows, grid, slice(0, None, 1)
+    edges = _edges(rows)
+    for parts in range(ceil(grid.step * RATE / fs), grid.step // 2 + 1):
+        apart = grid.step / parts
+        ahead, after = floor(before / apart), floor((H.shape[-1] - 1 - before) / apart)
+        thin = between_samples(H, before + apart * np.arange(-ahead, after + 1))
+        first = floor(grid.first / apart)
+        count = first + floor((samples - 1 - grid.first) / apart) + 1
+        places = grid.first + apart * (np.arange(count) - first)
+        if (np.abs(apart * np.matmul(thin, thin.T) - full) <= size).all() and _keep(edges, places, apart):
+            return list(np.sqrt(apart) * thin), Grid(first, parts, grid.count), places, fs / apart
+    return windows, grid, np.arange(float(samples)), fs
+
+
+def _edges(rows: RowMap) -> list[Array]:
+    """Return the weights w of samples and their two derivatives: edges of a mask are sharper than what rows pass."""
+    s = partial(CentralDifference(spacing=1 / rows.signals.fs).derivative, fs=rows.signals.fs)
+    rate = s(rows.inside)
+    return [rows.inside, rate, s(rate)]
+
+
+def _keep(signals: Sequence[Array], places: Array, apart: float) -> bool:
+    """Return whether signals have, at places so far apart, the energy that they have at all samples."""
+    each = ((np.sum(x**2, axis=-1), apart * np.sum(between_samples(x, places) ** 2, axis=-1)) for x in signals)
+    return all((np.abs(thin - whole) <= ALIASED * whole).all() for whole, thin in each)
 
 
 def _without_tails(windows: Sequence[Array], first: int) -> list[Array]:

@@ -1,39 +1,16 @@
 """The motion of one joint with its servo, step by step, as compiled code: one body, or rotor and link with free play."""
 
 import math
-from collections.abc import Callable
-from contextlib import suppress
-from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
 from idbench.identify.arrays import Array
+from idbench.identify.compiled import compiled
 
 LIGHT = 1e-9
 """Inertia of a link that has none, beside that of its rotor."""
-
-
-def _remove_stale() -> None:
-    """Remove compiled code that is older than this file: of an earlier version numba cannot even read the index."""
-    here = Path(__file__)
-    with suppress(OSError):  # a folder that cannot be written: nothing was kept there
-        for path in (here.parent / "__pycache__").glob(f"{here.stem}.*.nb?"):
-            if path.stat().st_mtime < here.stat().st_mtime:
-                path.unlink()
-
-
-_remove_stale()
-
-
-def _compiled(function: Callable[..., Any]) -> Any:
-    """Return compiled code, kept for the next process where there is a place for it."""
-    try:
-        return njit(cache=True, nogil=True)(function)
-    except RuntimeError:  # neither the project's folder nor a cache of the user can be written
-        return njit(nogil=True)(function)
 
 
 class ServoLaw(NamedTuple):
@@ -111,7 +88,7 @@ class Acting(NamedTuple):
     shaking: float
 
 
-@_compiled
+@compiled
 def friction(p: ServoLaw, speed: float, motor: float, external: float, sent: float) -> float:
     """Return the torque by which friction can resist at most [N m]."""
     total = p.Fs
@@ -124,7 +101,7 @@ def friction(p: ServoLaw, speed: float, motor: float, external: float, sent: flo
     return total + p.Fgd * max(sent, 0.0) + p.Fgb * max(-sent, 0.0)
 
 
-@_compiled
+@compiled
 def _slowed(free: float, speed: float, most: float) -> float:
     """Return the speed after a step in which friction takes away at most `most`.
 
@@ -140,7 +117,7 @@ def _slowed(free: float, speed: float, most: float) -> float:
     return left * (change - min(max(change, -most), most))
 
 
-@_compiled
+@compiled
 def _pushed(
     p: ServoLaw, firmware: Firmware, q: float, speed: float, target: float, forward: float, voltage: float
 ) -> tuple[float, float]:
@@ -169,7 +146,7 @@ def _pushed(
     return p.a * voltage * free, p.a * voltage * damping
 
 
-@_compiled
+@compiled
 def _after(p: ServoLaw, firmware: Firmware, of: Acting, speed: float, h: float) -> float:
     """Return the speed of rotor and link as one body after a step."""
     damping = p.b * of.on + of.damping
@@ -189,7 +166,7 @@ def _after(p: ServoLaw, firmware: Firmware, of: Acting, speed: float, h: float) 
     return _slowed(free, speed, later * resisting)
 
 
-@_compiled
+@compiled
 def _apart(
     p: ServoLaw, firmware: Firmware, of: Acting, link: float, rotor: float, gap: float, h: float
 ) -> tuple[float, float, float]:
@@ -210,7 +187,7 @@ def _apart(
     return together - closing, together, end
 
 
-@_compiled
+@compiled
 def targets(command: Array, rate: float, h: float, lag: float = 0.0, ahead: float = 0.0) -> Array:
     """Return the mean over each step h [s] of what follows a command within a rate [rad/s], low-passed with a time constant.
 
@@ -230,7 +207,7 @@ def targets(command: Array, rate: float, h: float, lag: float = 0.0, ahead: floa
     return means
 
 
-@_compiled
+@compiled
 def motion(p: ServoLaw, firmware: Firmware, track: Track, start: tuple[float, float, float], h: float, fastest: float) -> Array:
     """Return the angle of the log at each step [rad]; no speed gets beyond the fastest.
 
@@ -269,7 +246,7 @@ def motion(p: ServoLaw, firmware: Firmware, track: Track, start: tuple[float, fl
     return out
 
 
-@_compiled
+@compiled
 def at_samples(q: Array, before: npt.NDArray[np.int64], share: Array, count: float) -> Array:
     """Return positions between steps, linearly; at rest to the count [rad], if it is above 0."""
     out = np.empty(len(before))

@@ -67,6 +67,25 @@ def averaged(x: Array, variance: float) -> Array:
     return slide(x, np.array([variance / 2, 1 - variance, variance / 2])) if variance else x
 
 
+def between_samples(x: Array, places: Array) -> Array:
+    """Return `x`, shape (..., time), at places [samples], linearly between two of its samples: x(k + s) = x(k) + s (x(k+1) - x(k)).
+
+    Parameters
+    ----------
+    x : Array, shape (..., time)
+        The signal.
+    places : Array, shape (m,)
+        From 0 to the last sample.
+    """
+    first = places.astype(np.intp)
+    s = places - first
+    there = x[..., first]
+    if not s.any():
+        return there
+    later: Array = x[..., np.minimum(first + 1, x.shape[-1] - 1)]
+    return there + s * (later - there)
+
+
 def shift(x: Array, samples: float) -> Array:
     """Return x at k + `samples`, for every k; exact for polynomials of degree 2 REACH - 1."""
     whole = floor(samples)

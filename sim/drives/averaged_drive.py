@@ -66,6 +66,7 @@ class _Amplifier(AbstractAmplifier):
         self._w, self._h = w, h
         self._R, self._L, self._K, self._V, self._I = (every(x, nsim) for x in (motors.R, motors.L, motors.K, V, I))
         self._i = np.zeros(self._R.shape)
+        self._known: dict[int, tuple[Array, Array]] = {}
 
     def step(self, demand: Array, speed: Array, steps: int) -> Array:
         dt = steps * self._h
@@ -75,21 +76,31 @@ class _Amplifier(AbstractAmplifier):
         target = np.minimum(np.maximum(limited, (-self._V - e) / self._R), (self._V - e) / self._R)
         asked = self._R * i0 + self._L * self._w * (target - i0) + e
         saturated = np.abs(asked) > self._V
-        if saturated.any():
+        if saturated.any():  # L di/dt = v - R i - e with v at its limit, for the time t
             v = np.copysign(self._V, asked)
             t = np.where(saturated, np.minimum(self._release(v, target, e), dt), 0.0)
             end = (v - e) / self._R
             i1 = np.where(saturated, end + (i0 - end) * np.exp(-t * self._R / self._L), i0)
             charge = np.where(saturated, end * t - (i1 - i0) * self._L / self._R, 0.0)
+            away, rest = i1 - target, dt - t
+            left, lost = self._relaxed(rest)
+            current = (charge + target * rest - away * lost) / dt
         else:
-            t = np.zeros(1)
-            i1 = i0
-            charge = np.zeros(1)
-        away, rest = i1 - target, dt - t
-        self._i = target + away * np.exp(-self._w * rest)
-        current = (charge + target * rest - away * (np.expm1(-self._w * rest) / self._w)) / dt
+            away = i0 - target
+            left, lost = self._wholly(steps)
+            current = (target * dt - away * lost) / dt
+        self._i = target + away * left
         self.trace = demand, limited, current, i0, self._i, e, saturated
         return (self._K * current)[None]
+
+    def _relaxed(self, rest: Array) -> tuple[Array, Array]:
+        """Return what is left of a deviation after a time [s], exp(-w t), and minus its integral, (exp(-w t) - 1) / w."""
+        return np.exp(-self._w * rest), np.expm1(-self._w * rest) / self._w
+
+    def _wholly(self, steps: int) -> tuple[Array, Array]:
+        if steps not in self._known:
+            self._known[steps] = self._relaxed(np.array([steps * self._h]))
+        return self._known[steps]
 
     def electric(self, trace: Trace, dt: Array) -> Electric:
         demand, reference, current, i0, i1, e, saturated = trace

@@ -5,8 +5,9 @@ from functools import cached_property
 
 import numpy as np
 
+from idbench.sim.drives.periods import Loops, Table, Windings, periods
 from idbench.sim.drives.pwm import Modulator, Pieces, pieces
-from idbench.sim.drives.winding import Passage, Winding, pass_period, step_by_step, straight
+from idbench.sim.drives.winding import Winding, pass_period, straight
 from idbench.sim.robot.motors import Array
 
 MAX_VALUES = 20_000
@@ -22,9 +23,24 @@ class ExactPassages:
     modulator: Modulator
     """Its chopper."""
 
-    def through(self, i: Array, m: Array, e: Array) -> Passage:
-        """Return the passage of currents `i` [A] at modulation index `m` and back-EMF `e` [V], all of shape (sim, joint)."""
-        return pass_period(i, m, e, self.winding, self.modulator)
+    least: float = 0.0
+    """Step of the modulation index, 0 if it has none."""
+
+    def advance(self, loops: Loops, windings: Windings, wanted: Array, emf: Array) -> Array:
+        """Advance windings by PWM periods, in arrays over windings; arguments and what is returned as for `periods`."""
+        done = np.empty((4, *emf.shape))
+        charge, before, after, index = done
+        for k, e in enumerate(emf):
+            error = wanted - windings.i
+            asked = loops.kp * error + windings.sum + loops.known * e
+            v = np.minimum(np.maximum(asked, -loops.most), loops.most)
+            windings.sum[:] += loops.ki * error * (v == asked)
+            m = v / self.winding.V
+            index[k], before[k] = np.rint(m / self.least) * self.least if self.least else m, windings.i
+            after[k], charge[k], electrical = pass_period(windings.i, index[k], e, self.winding, self.modulator)
+            windings.i[:] = after[k]
+            windings.electrical[:] += electrical
+        return done
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,25 +58,9 @@ class TabulatedPassages:
     least: float
     """Step of the modulation index."""
 
-    def through(self, i: Array, m: Array, e: Array) -> Passage:
-        """Return the passage of currents `i` [A] at modulation index `m` and back-EMF `e` [V], all of shape (sim, joint)."""
-        n = i.shape[-1]
-        value = np.rint(m / self.least).astype(np.intp) + self.highest
-        at = ((i > 0) * self._values + value) * n + np.arange(n)
-        found = np.take(self._table, at, axis=0)
-        quantities = found[..., 0, :] + found[..., 1, :] * i[..., None] + found[..., 2, :] * e[..., None]
-        charge = quantities[..., 0]
-        electrical = quantities[..., 1]
-        edges = quantities[..., 2:]
-        passage = Passage(edges[..., -1].copy(), charge, electrical)
-        if self.modulator.dead_time:
-            turning = (edges * i[..., None] <= 0).any(axis=-1)
-            if turning.any():
-                some = Winding(*(x[turning] for x in self.winding))
-                careful = step_by_step(i[turning], e[turning], some, Pieces(*(x[:, value[turning]] for x in self._pieces)))
-                for whole, part in zip(passage, careful, strict=True):
-                    whole[turning] = part
-        return passage
+    def advance(self, loops: Loops, windings: Windings, wanted: Array, emf: Array) -> Array:
+        """Advance windings by PWM periods, as `ExactPassages` does."""
+        return np.asarray(periods(self._compact, loops, windings, wanted, np.ascontiguousarray(emf)))
 
     @cached_property
     def highest(self) -> int:
@@ -71,20 +71,16 @@ class TabulatedPassages:
     def _values(self) -> int:
         return 2 * self.highest + 1
 
-    def rows(self, joint: int) -> tuple[list[list[list[float]]], ...]:
-        """Return the table of one joint, for a current that is not positive and one that is: value -> three rows."""
-        n = self.winding.V.shape[-1]
-        table = self._table.reshape(2, self._values, n, 3, -1)
-        return tuple(of_sign[:, joint].tolist() for of_sign in table)
-
-    def pieces_of(self, joint: int) -> list[list[tuple[float, ...]]]:
-        """Return, for each value, its pieces: duration, voltages ahead and behind, and what is kept of the current."""
-        _, R, L = (x[0, joint] for x in self.winding)
-        kept = np.exp(-self._pieces.duration * (R / L))
-        return [
-            [tuple(piece) for piece in of_value]
-            for of_value in np.stack([*self._pieces, kept], axis=-1).swapaxes(0, 1).tolist()
-        ]
+    @cached_property
+    def _compact(self) -> Table:
+        """The table, as compiled code takes it."""
+        V, R, L = (np.ascontiguousarray(x[0]) for x in self.winding)
+        shape = *self._pieces.duration.shape, len(V)
+        kept = np.exp(-self._pieces.duration[..., None] * (R / L))
+        each = [np.broadcast_to(x[..., None], shape) for x in self._pieces]
+        of_pieces = np.ascontiguousarray(np.stack([*each, kept], axis=-1).swapaxes(0, 1))
+        linear = self._table.reshape(2, self._values, len(V), 3, -1)
+        return Table(self.least, self.highest, linear, of_pieces, V, R, L, bool(self.modulator.dead_time))
 
     @cached_property
     def _indices(self) -> Array:
@@ -116,4 +112,4 @@ def passages(winding: Winding, modulator: Modulator, least: float) -> ExactPassa
     """Return the passages of windings; `least` is the step of the modulation index, 0 if it has none."""
     if least and 2 / least < MAX_VALUES:
         return TabulatedPassages(winding, modulator, least)
-    return ExactPassages(winding, modulator)
+    return ExactPassages(winding, modulator, least)

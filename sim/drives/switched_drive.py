@@ -7,17 +7,14 @@ from pydantic import Field
 
 from idbench.sim.drives.averaged_drive import limits
 from idbench.sim.drives.drive import AbstractAmplifier, AbstractDrive, BetweenEdges, Electric, Trace, every
-from idbench.sim.drives.one_winding import Loop, OneWinding
-from idbench.sim.drives.passages import TabulatedPassages, passages
+from idbench.sim.drives.passages import passages
+from idbench.sim.drives.periods import Loops, Windings
 from idbench.sim.drives.pwm import Modulation, Modulator, pieces
 from idbench.sim.drives.winding import Winding, stretches
 from idbench.sim.errors import ScenarioError
 from idbench.sim.robot.motors import Array, Motors
 from idbench.sim.robot.robot import Robot
 from idbench.sim.settings import EachPositiveOrNone, NotNegative, Number, Positive, Share, settings
-
-FEW = 8
-"""Windings up to which they are faster one by one than in arrays."""
 
 
 @final
@@ -89,8 +86,7 @@ class SwitchedDrive(AbstractDrive):
 class SwitchedAmplifier(AbstractAmplifier):
     """The chopper at work.
 
-    `i` is the current [A], `electrical` and `mechanical` count what came in at the terminals and what went to the rotor [J],
-    all of shape (nsim, joint).
+    `mechanical` counts what went to the rotors [J], shape (sim, joint).
     """
 
     def __init__(self, settings: SwitchedDrive, motors: Motors, V: Array, I: Array, nsim: int, h: float) -> None:  # noqa: E741
@@ -99,55 +95,34 @@ class SwitchedAmplifier(AbstractAmplifier):
         self._h = h
         self._winding = Winding(V, R, L)
         lost = -np.expm1(-h * R / L)
-        self._kp = R / lost * -np.expm1(-2 * np.pi * settings.bandwidth * h)
-        self._ki = self._kp * lost
-        self._least = settings.duty_resolution * (1 if settings.modulation == "sign_magnitude" else 2)
-        self._passages = passages(self._winding, Modulator(settings.modulation, h, settings.dead_time), self._least)
+        kp = R / lost * -np.expm1(-2 * np.pi * settings.bandwidth * h)
+        least = settings.duty_resolution * (1 if settings.modulation == "sign_magnitude" else 2)
+        self._passages = passages(self._winding, Modulator(settings.modulation, h, settings.dead_time), least)
         most = 1 - 4 * settings.dead_time / h
-        self._most = (np.floor(most / self._least) * self._least if self._least else most) * V
-        self._known = settings.emf_compensation
-        self.i, self._sum, self.electrical, self.mechanical = np.zeros((4, *V.shape))
-        self._single = self._one_by_one()
+        self._most = (np.floor(most / least) * least if least else most) * V
+        self._loops = Loops(kp, kp * lost, self._most, settings.emf_compensation)
+        *state, self.mechanical = np.zeros((4, *V.shape))
+        self._windings = Windings(*state)
 
-    def _one_by_one(self) -> dict[tuple[int, int], OneWinding]:
-        """Return the windings one by one, where they are few and have a table."""
-        if not isinstance(self._passages, TabulatedPassages) or self.i.size > FEW:
-            return {}
-        gains = np.broadcast_arrays(self._kp, self._ki, self._most)
-        each = {}
-        for at in np.ndindex(self.i.shape):
-            kp, ki, most = (float(x[at]) for x in gains)
-            each[at] = Loop(kp, ki, most, self._known)
-        return {(sim, joint): OneWinding(self._passages, joint, loop) for (sim, joint), loop in each.items()}
+    @property
+    def i(self) -> Array:
+        """Currents [A], shape (sim, joint)."""
+        return self._windings.i
+
+    @property
+    def electrical(self) -> Array:
+        """What came in at the terminals [J], shape (sim, joint)."""
+        return self._windings.electrical
 
     def step(self, demand: Array, speed: Array, steps: int) -> Array:
         """Advance by PWM periods; return the mean torque in each."""
         del steps
         wanted = np.minimum(np.maximum(demand / self._K, -self._I), self._I)
         e = self._K * speed
-        charge, before, after, index = self._each(wanted, e) if self._single else self._together(wanted, e)
+        charge, before, after, index = self._passages.advance(self._loops, self._windings, wanted, e)
         self.trace = wanted, charge, before, after, e, index
         self.mechanical += (e * charge).sum(axis=0)
         return charge * (self._K / self._h)
-
-    def _each(self, wanted: Array, e: Array) -> Array:
-        """Advance one winding after the other; return charge, currents before and after, and modulation index."""
-        done = np.empty((4, *e.shape))
-        for at, winding in self._single.items():
-            done[(slice(None), slice(None), *at)] = winding.advance(float(wanted[at]), e[(slice(None), *at)].tolist())
-            self.i[at], self.electrical[at] = winding.i, winding.electrical
-        return done
-
-    def _together(self, wanted: Array, e: Array) -> Array:
-        """Advance all windings, period by period; return charge, currents before and after, and modulation index."""
-        done = np.empty((4, *e.shape))
-        charge, before, after, index = done
-        for k in range(len(e)):
-            index[k], before[k] = self._index(wanted, self._known * e[k]), self.i
-            self.i, charge[k], electrical = self._passages.through(self.i, index[k], e[k])
-            self.electrical += electrical
-            after[k] = self.i
-        return done
 
     def electric(self, trace: Trace, dt: Array) -> Electric:
         """Return currents and voltages of PWM periods."""
@@ -176,12 +151,3 @@ class SwitchedAmplifier(AbstractAmplifier):
     def copper(self) -> Array:
         """What became heat [J]: what came in, less what went to the rotor and what is stored, L i^2 / 2."""
         return self.electrical - self.mechanical - self._winding.L / 2 * self.i**2
-
-    def _index(self, wanted: Array, emf: Array) -> Array:
-        """Return the modulation that the current loop asks for; its integrator rests while the voltage is at its limit."""
-        error = wanted - self.i
-        asked = self._kp * error + self._sum + emf
-        v = np.minimum(np.maximum(asked, -self._most), self._most)
-        self._sum += self._ki * error * (v == asked)
-        m = v / self._winding.V
-        return np.rint(m / self._least) * self._least if self._least else m

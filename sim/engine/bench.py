@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from math import isfinite
 from typing import TypeVar
 
 import numpy as np
@@ -73,7 +74,7 @@ class Bench:
         self._encoder = _started(encoder, encoder.start(n, samples, fs, generators(seeds, 0)), AbstractReader)
         self._each = nsim, n
         self._sensor = CurrentSensor(scenario.torque, nsim, n)
-        self._jitter = self._drawn_jitter(samples)
+        self._jitter = self._drawn_jitter(samples) if scenario.timing.jitter or scenario.timing.refresh else None
         self._history = History(
             clock.late + clock.per_sample + int(np.ceil(scenario.timing.refresh / self._h)), nsim, n, self._h
         )
@@ -83,7 +84,7 @@ class Bench:
         self._before = self._command = self._demand = _holding(scenario, robot, self._at_rest, vary)
         self._qd = np.zeros((nsim, n))
         self._steps = 1
-        self._instants = dict[int, Array]()
+        self._instants = dict[int, tuple[Array, Array]]()
         self._steady = scenario.drive.steady and scenario.ripple.steady
         self._most = self._longest()
         self._measured, self._commands, self._currents, self._q, self._speeds, self._tau = np.zeros((6, samples, nsim, n))
@@ -135,12 +136,13 @@ class Bench:
         before_gear = self._scenario.drive.before_gear
         self._history.put(step, *((rotor_q, rotor_qd) if before_gear else (q, qd)))
         steps = self._listen(step)
-        t = self._middles(steps)
+        t, half_square = self._middles(steps)
         rate = (rotor_qd - self._qd) / (self._steps * self._h)  # accelerating as in the steps before
-        mid_qd, mid_q = rotor_qd + rate * t, rotor_q + rotor_qd * t + rate * (t**2 / 2)
+        mid_qd, mid_q = rotor_qd + rate * t, rotor_q + rotor_qd * t + rate * half_square
         self._qd, self._steps = rotor_qd.copy(), steps
         constant = 1 + self._ripple.commutation.at(mid_q)
-        self._drive.sees(mid_q if before_gear else mid_q + (q - rotor_q) + (qd - rotor_qd) * t)
+        apart = self._plant.has_play and not before_gear
+        self._drive.sees(mid_q + (q - rotor_q) + (qd - rotor_qd) * t if apart else mid_q)
         electric = self._drive.step(self._demand, mid_qd * constant, steps)
         expect(self._drive, "step", electric, (1, *self._each), (steps, *self._each))
         self._sensor.take(electric, steps * self._h)
@@ -149,7 +151,7 @@ class Bench:
         resistance = self._friction.torque(mid_qd[0])
         expect(self._friction, "torque", np.asarray(resistance), (), self._each)
         total = tau + resistance
-        if not np.isfinite(total).all():
+        if not isfinite(np.add.reduce(total, axis=None)):
             self._stop_failed(step)
             self._failures.finite({"the controller": self._demand, "the drive": tau, "the friction": resistance})
             self._stop_failed(step)
@@ -158,7 +160,7 @@ class Bench:
         self._plant.step(total, steps, self._going)
         current = step // self._clock.per_sample
         if current < len(self._tau):
-            self._tau[current] += tau[0] if steps == 1 else tau.mean(axis=0) * steps
+            self._tau[current] += tau[0] if len(tau) == 1 == steps else np.add.reduce(tau) / len(tau) * steps
         return steps
 
     def _final(self, step: int) -> int:
@@ -181,18 +183,21 @@ class Bench:
                 channels["gap"] = self._gaps
             self._watcher.tell(self._final(step), self._planned, channels, self._drive)
 
-    def _middles(self, steps: int) -> Array:
-        """Return the middle of each of the steps to come [s], shape (steps, 1, 1), or of all of them for steady parts."""
+    def _middles(self, steps: int) -> tuple[Array, Array]:
+        """Return the middle t of each of the steps to come [s], shape (steps, 1, 1), or of all for steady parts, and t^2 / 2."""
         if steps not in self._instants:
             count = 1 if self._steady else steps
-            self._instants[steps] = np.linspace(0.5, count - 0.5, count)[:, None, None] * (steps / count * self._h)
+            t = np.linspace(0.5, count - 0.5, count)[:, None, None] * (steps / count * self._h)
+            self._instants[steps] = t, t**2 / 2
         return self._instants[steps]
 
     def _listen(self, step: int) -> int:
         """Let the command whose turn it is act; return for how many steps nothing changes."""
         clock, (k, after) = self._clock, self._clock.command(step)
         if after == 0 and k >= 0:
-            q = self._encoder.read(k, self._history.at(step - clock.late + self._jitter[k]))
+            taken = step - clock.late
+            then = self._history.whole(taken) if self._jitter is None else self._history.at(taken + self._jitter[k])
+            q = self._encoder.read(k, then)
             expect(self._encoder, "read", q, self._each)
             self._before, self._command = self._command, expect(self._law, "command", self._law.command(k, q), self._each)
             self._measured[k], self._commands[k] = q, self._command

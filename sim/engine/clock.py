@@ -1,6 +1,7 @@
 """Which sample and which command a physics step belongs to."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -18,12 +19,12 @@ class Clock:
     delay: float
     """Computing delay [s], not below zero."""
 
-    @property
+    @cached_property
     def late(self) -> int:
         """Whole physics steps between a sample and the step in which its command begins to act."""
         return int(self.delay / self.h + 1e-9)
 
-    @property
+    @cached_property
     def old(self) -> float:
         """Share of that step in which the command before still acts."""
         return max(0.0, self.delay / self.h - self.late)
@@ -67,6 +68,10 @@ class History:
         """Remember the state at the beginning of physics step `step`."""
         self._q[step % self._size], self._qd[step % self._size] = q, qd
         self._last = step
+
+    def whole(self, step: int) -> Array:
+        """Return positions [rad], shape (nsim, joint), at the beginning of a physics step."""
+        return self._q[min(max(step, 0), self._last) % self._size].copy()
 
     def at(self, x: Array) -> Array:
         """Return positions [rad], shape (nsim, joint), at the instants `x`, shape (nsim,), counted in physics steps.

@@ -21,7 +21,7 @@ from idbench.sim.scenario.scenario import Physics
 from idbench.sim.trajectories import Reference
 
 STEP = 0.002
-"""Longest physics step of shooting [s]: of half a second nothing is lost by it."""
+"""Longest physics step [s]: by RK4, positions of six held joints change by 3e-6 rad of 2e-4 when it is halved."""
 
 Feedback = Callable[[int, Plant], Array]
 """Torque beside that of the log at a sample [N m], shape (joint,)."""
@@ -135,7 +135,7 @@ def shoot(
         Torques beside those of the log [N m].
     """
     beside = None if disturbance is None else lambda k, _: disturbance[:, k]
-    found, broken = _driven(_start(robot, log, *states, Physics(step=STEP), vary, 0), np.asarray(first), count, beside)
+    found, broken = _driven(_start(robot, log, *states, vary, 0), np.asarray(first), count, beside)
     found[broken] = np.nan
     return found
 
@@ -145,12 +145,11 @@ def _start(
     log: MotionLog,
     q: Array,
     qd: Array,
-    physics: Physics | None = None,
     vary: Mapping[str, npt.ArrayLike] | None = None,
     threads: int = 1,
 ) -> tuple[Plant, Array]:
     """Return robots in states [rad, rad/s], and the torques of a log in every physics step, shape (step, time, joint)."""
-    physics = physics or Physics()
+    physics = Physics(step=STEP)
     h, per_sample = physics_steps(log.fs, physics.step)
     plant = Plant(robot, len(q), physics, h, vary or {}, threads)
     plant.q[:], plant.qd[:] = q, qd

@@ -162,8 +162,11 @@ class _Series:
         if self.still:
             return 0.0
         angle = self.order * q + self.phase
-        parts = [share * np.sin(k * angle) for k, share in enumerate(self.harmonics, 1)]
-        return self.amplitude * sum(parts[1:], start=parts[0])
+        first, *higher = self.harmonics
+        total = np.sin(angle) if first == 1 else first * np.sin(angle)
+        for k, share in enumerate(higher, 2):
+            total += share * np.sin(k * angle)
+        return self.amplitude * total
 
 
 @dataclass(frozen=True, eq=False)

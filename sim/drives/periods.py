@@ -1,0 +1,142 @@
+"""PWM periods of windings behind their current loops, one after the other, as compiled code."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from idbench.identify.compiled import compiled
+from idbench.sim.robot.motors import Array
+
+
+class Loops(NamedTuple):
+    """Sampled PI current loops with feedforward of the back-EMF; arrays of shape (sim, joint)."""
+
+    kp: Array
+    """Proportional gain [V/A]."""
+    ki: Array
+    """Integral gain, times the sampling period [V/A]."""
+    most: Array
+    """Largest voltage that they ask for [V]."""
+    known: float
+    """Share of the back-EMF that they feed forward."""
+
+
+class Windings(NamedTuple):
+    """What is remembered of windings from period to period, shape (sim, joint) each; changed in place."""
+
+    i: Array
+    """Current [A]."""
+    sum: Array
+    """Of the loop's integrator [V]."""
+    electrical: Array
+    """Energy that came in at the terminals [J]."""
+
+
+class Table(NamedTuple):
+    """What a period does at every value of the modulation index, `least` apart, the first being -`highest`."""
+
+    least: float
+    highest: int
+    linear: Array
+    """Charge, electrical energy and currents at edges while a current keeps its sign: (sign, value, joint) -> (constant, by i,
+    by e) x quantity."""
+    pieces: Array
+    """Duration, voltages ahead and behind [bus voltages], and what is kept of the current, (value, piece, joint, 4)."""
+    V: Array
+    """Shape (joint,)."""
+    R: Array
+    L: Array
+    has_dead_time: bool
+
+
+@compiled
+def _over_zero(i: float, goal: float, dt: float, onward: float, rate: float) -> tuple[float, float]:
+    """Return for how long [s] of a piece the current is zero or beyond, and where it ends: zero, or where e drives it on."""
+    until = math.log(1 - i / goal) / rate if goal != 0.0 and i != 0.0 else 0.0
+    rest = dt - min(until, dt)
+    return rest, -onward * math.expm1(-rest * rate)
+
+
+@compiled
+def _careful(i: float, pieces: Array, e: float, V: float, R: float, L: float) -> tuple[float, float, float]:
+    """Return the passage of a current that may change its sign: current [A], charge [A s] and energy [J]."""
+    total, electrical = 0.0, 0.0
+    share, rate = L / R, R / L
+    for k in range(len(pieces)):
+        dt, forward, backward, kept = pieces[k]
+        ahead, behind = (forward * V - e) / R, (backward * V - e) / R
+        goal = ahead if ahead == behind or i > 0.0 else behind
+        end = goal + (i - goal) * kept
+        if ahead != behind and i * end <= 0.0:
+            onward = max(ahead, 0.0) + min(behind, 0.0)
+            rest, end = _over_zero(i, goal, dt, onward, rate)
+            charge = goal * (dt - rest) + (i - 0.0) * share
+            total += charge
+            electrical += (goal * R + e) * charge
+            i, goal, dt = 0.0, onward, rest
+        charge = goal * dt + (i - end) * share
+        total += charge
+        electrical += (goal * R + e) * charge
+        i = end
+    return i, total, electrical
+
+
+@compiled
+def _passage(table: Table, joint: int, i: float, value: int, e: float) -> tuple[float, float, float]:
+    """Return the current after a period [A], its charge [A s] and energy [J]: constant + by_i i + by_e e, if it keeps its sign."""
+    found = table.linear[1 if i > 0.0 else 0, value, joint]
+    last = found.shape[1] - 1
+    now = 0.0
+    for edge in range(2, last + 1):
+        now = found[0, edge] + found[1, edge] * i + found[2, edge] * e
+        if table.has_dead_time and now * i <= 0.0:
+            return _careful(i, table.pieces[value, :, joint], e, table.V[joint], table.R[joint], table.L[joint])
+    charge = found[0, 0] + found[1, 0] * i + found[2, 0] * e
+    return now, charge, found[0, 1] + found[1, 1] * i + found[2, 1] * e
+
+
+@compiled
+def periods(table: Table, loops: Loops, windings: Windings, wanted: Array, emf: Array) -> Array:
+    """Advance windings by PWM periods.
+
+    In each, v = kp (i_ref - i) + sum + known e within its limit; the integrator rests while v is at it.
+
+    Parameters
+    ----------
+    table, loops, windings
+        The windings, their loops, and their state.
+    wanted : Array, shape (sim, joint)
+        Current references [A].
+    emf : Array, shape (period, sim, joint)
+        Back-EMF [V].
+
+    Returns
+    -------
+    Array, shape (4, period, sim, joint)
+        Charge [A s], currents before and after [A], and modulation index.
+    """
+    done = np.empty((4, *emf.shape))
+    for sim in range(wanted.shape[0]):
+        for joint in range(wanted.shape[1]):
+            kp, ki, most = loops.kp[sim, joint], loops.ki[sim, joint], loops.most[sim, joint]
+            i, total, electrical = windings.i[sim, joint], windings.sum[sim, joint], windings.electrical[sim, joint]
+            for k in range(len(emf)):
+                e = emf[k, sim, joint]
+                error = wanted[sim, joint] - i
+                asked = kp * error + total + loops.known * e
+                v = min(max(asked, -most), most)
+                if v == asked:
+                    total += ki * error
+                steps = np.rint(v / table.V[joint] / table.least)
+                done[1, k, sim, joint] = i
+                done[3, k, sim, joint] = steps * table.least
+                if math.isfinite(asked) and math.isfinite(e):
+                    i, charge, energy = _passage(table, joint, i, int(steps) + table.highest, e)
+                else:  # of no size, as those who command it will be told
+                    i, charge, energy = math.nan, math.nan, math.nan
+                electrical += energy
+                done[0, k, sim, joint] = charge
+                done[2, k, sim, joint] = i
+            windings.i[sim, joint], windings.sum[sim, joint], windings.electrical[sim, joint] = i, total, electrical
+    return done
