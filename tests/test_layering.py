@@ -16,6 +16,7 @@ CONTRACT = {
     "idbench.identify.plugins",
     "idbench.identify.errors",
     "idbench.identify.blame",
+    "idbench.identify.compiled",
 }
 """What `sim` may know of `identify`: contract types, laws of friction, plug-in tables, and whose mistake it is."""
 

@@ -3,8 +3,10 @@
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import combinations
+from math import ceil
 
 import numpy as np
+import numpy.typing as npt
 
 from idbench.identify.arrays import Array
 from idbench.identify.basis.basis import Basis
@@ -35,6 +37,9 @@ NEARLY = 0.6
 MOST = 3
 """Large mistakes that are tried on held-out stretches, the most likely first."""
 
+ENOUGH = 20.0
+"""Rows a parameter with which many mistakes are looked for before all of a log is asked."""
+
 NOTHING_LEFT = 1 / 3
 """Share of the largest error that the right sign or axis leaves at most: a wrong one also explains a part of other mistakes."""
 
@@ -53,6 +58,15 @@ class _Tried:
     problem: Problem
     """The problem as it would be without the mistake."""
 
+    @property
+    def key(self) -> tuple[str, str, int | None, tuple[float, ...]]:
+        """What distinguishes it from others."""
+        return self.cause, self.of, self.joint, self.size
+
+    def misfit(self, rows: npt.NDArray[np.intp]) -> float:
+        """Return minus twice the log-likelihood without the mistake, as of so many rows of each kind; its rows are not kept."""
+        return float(self.problem.with_logs(self.problem.logs).factors.misfit(rows))
+
 
 def whole_mistake(problem: Problem, small: Suspect | None = None) -> Suspect | None:
     """Return the mistake without which the rows are by far most likely, by more than a `small` one; None where none is.
@@ -63,8 +77,8 @@ def whole_mistake(problem: Problem, small: Suspect | None = None) -> Suspect | N
     before, counts = float(explicit.factors.misfit()), explicit.factors.rows
     tried = [*_signs(explicit), *_gravities(explicit), *(_rates(explicit) if small else ())]
     if small or _worst(explicit) > POOR:
-        tried += [*_across(explicit), *_exchanged(explicit), *_turned(explicit)]
-    gains = [before - float(each.problem.with_logs(each.problem.logs).factors.misfit(counts)) for each in tried]  # kept by none
+        tried += _likely(explicit)
+    gains = [before - each.misfit(counts) for each in tried]
     found = sorted(zip(gains, tried, strict=True), key=lambda one: -one[0])
     before_errors = held_out_errors(explicit)
     for gain, best in found[:MOST]:
@@ -81,6 +95,26 @@ def whole_mistake(problem: Problem, small: Suspect | None = None) -> Suspect | N
         pair, unit = (float(before_errors[k]), float(errors[k])), "rad" if best.cause == "zero" else "1"
         return Suspect(best.cause, best.of, best.joint, best.size, (0.0,), unit, 0.0, float(np.sqrt(gain)), others, pair, gain)
     return None
+
+
+def _likely(problem: Problem) -> Iterator[_Tried]:
+    """Yield other axes of gravity, exchanged joints and other zeros, of those that the middle of a long log does not refute."""
+    every, log = _others(problem), problem.logs[0]
+    length = ceil(log.samples * ENOUGH * len(problem.names) / len(problem.rows.time))
+    begin = (log.samples - length) // 2
+    if len(problem.logs) > 1 or 2 * length > log.samples:
+        yield from every
+        return
+    few = problem.with_logs([log.part(begin, begin + length)])
+    before, counts = float(few.factors.misfit()), few.factors.rows
+    left = {each.key for each in _others(few) if not each.misfit(counts) > before} if np.isfinite(before) else None
+    yield from (each for each in every if left is None or each.key in left)
+
+
+def _others(problem: Problem) -> Iterator[_Tried]:
+    yield from _across(problem)
+    yield from _exchanged(problem)
+    yield from _turned(problem)
 
 
 def _worst(problem: Problem) -> float:

@@ -107,9 +107,9 @@ def position_paths(rows: RowMap, linear: Linearization) -> Paths:
 
         h w B (M s^2 + D s + K) n -> [h'' w B M + h' (2 (w B M)' - w B D) + h ((w B M)'' - (w B D)' + w B K)] n
     """
-    windows, grid, places, rate = _thinned(_responses(rows), rows)
+    windows, grid, places, per_second = _thinned(_responses(rows), rows)
     M, D, K = linear.at(places)
-    s = partial(CentralDifference(spacing=1 / rate).derivative, fs=rate)
+    s = partial(CentralDifference(spacing=1 / per_second).derivative, fs=per_second)
     M_rate, D_rate = s(M), s(D)
     M_bend = s(M_rate)
     inertia, damping, stiffness = (np.zeros((*M.shape[:-3], rows.outside.shape[-2], *M.shape[-2:])) for _ in range(3))

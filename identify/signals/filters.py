@@ -68,7 +68,7 @@ def averaged(x: Array, variance: float) -> Array:
 
 
 def between_samples(x: Array, places: Array) -> Array:
-    """Return `x`, shape (..., time), at places [samples], linearly between two of its samples: x(k + s) = x(k) + s (x(k+1) - x(k)).
+    """Return `x` at places [samples], linearly between two of its samples: x(k + s) = x(k) + s (x(k + 1) - x(k)).
 
     Parameters
     ----------

@@ -94,7 +94,7 @@ class _Amplifier(AbstractAmplifier):
         return (self._K * current)[None]
 
     def _relaxed(self, rest: Array) -> tuple[Array, Array]:
-        """Return what is left of a deviation after a time [s], exp(-w t), and minus its integral, (exp(-w t) - 1) / w."""
+        """Return what a deviation becomes after a time [s], exp(-w t), and minus its integral, (exp(-w t) - 1) / w."""
         return np.exp(-self._w * rest), np.expm1(-self._w * rest) / self._w
 
     def _wholly(self, steps: int) -> tuple[Array, Array]:

@@ -5,7 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
-from idbench.sim.drives.periods import Loops, Table, Windings, periods
+from idbench.sim.drives.loops import Loops, PeriodTable, Windings
 from idbench.sim.drives.pwm import Modulator, Pieces, pieces
 from idbench.sim.drives.winding import Winding, pass_period, straight
 from idbench.sim.robot.motors import Array
@@ -60,6 +60,8 @@ class TabulatedPassages:
 
     def advance(self, loops: Loops, windings: Windings, wanted: Array, emf: Array) -> Array:
         """Advance windings by PWM periods, as `ExactPassages` does."""
+        from idbench.sim.drives.periods import periods  # loads a compiler
+
         return np.asarray(periods(self._compact, loops, windings, wanted, np.ascontiguousarray(emf)))
 
     @cached_property
@@ -72,7 +74,7 @@ class TabulatedPassages:
         return 2 * self.highest + 1
 
     @cached_property
-    def _compact(self) -> Table:
+    def _compact(self) -> PeriodTable:
         """The table, as compiled code takes it."""
         V, R, L = (np.ascontiguousarray(x[0]) for x in self.winding)
         shape = *self._pieces.duration.shape, len(V)
@@ -80,7 +82,7 @@ class TabulatedPassages:
         each = [np.broadcast_to(x[..., None], shape) for x in self._pieces]
         of_pieces = np.ascontiguousarray(np.stack([*each, kept], axis=-1).swapaxes(0, 1))
         linear = self._table.reshape(2, self._values, len(V), 3, -1)
-        return Table(self.least, self.highest, linear, of_pieces, V, R, L, bool(self.modulator.dead_time))
+        return PeriodTable(self.least, self.highest, linear, of_pieces, V, R, L, bool(self.modulator.dead_time))
 
     @cached_property
     def _indices(self) -> Array:

@@ -1,53 +1,12 @@
 """PWM periods of windings behind their current loops, one after the other, as compiled code."""
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
 from idbench.identify.compiled import compiled
+from idbench.sim.drives.loops import Loops, PeriodTable, Windings
 from idbench.sim.robot.motors import Array
-
-
-class Loops(NamedTuple):
-    """Sampled PI current loops with feedforward of the back-EMF; arrays of shape (sim, joint)."""
-
-    kp: Array
-    """Proportional gain [V/A]."""
-    ki: Array
-    """Integral gain, times the sampling period [V/A]."""
-    most: Array
-    """Largest voltage that they ask for [V]."""
-    known: float
-    """Share of the back-EMF that they feed forward."""
-
-
-class Windings(NamedTuple):
-    """What is remembered of windings from period to period, shape (sim, joint) each; changed in place."""
-
-    i: Array
-    """Current [A]."""
-    sum: Array
-    """Of the loop's integrator [V]."""
-    electrical: Array
-    """Energy that came in at the terminals [J]."""
-
-
-class Table(NamedTuple):
-    """What a period does at every value of the modulation index, `least` apart, the first being -`highest`."""
-
-    least: float
-    highest: int
-    linear: Array
-    """Charge, electrical energy and currents at edges while a current keeps its sign: (sign, value, joint) -> (constant, by i,
-    by e) x quantity."""
-    pieces: Array
-    """Duration, voltages ahead and behind [bus voltages], and what is kept of the current, (value, piece, joint, 4)."""
-    V: Array
-    """Shape (joint,)."""
-    R: Array
-    L: Array
-    has_dead_time: bool
 
 
 @compiled
@@ -74,7 +33,8 @@ def _careful(i: float, pieces: Array, e: float, V: float, R: float, L: float) ->
             charge = goal * (dt - rest) + (i - 0.0) * share
             total += charge
             electrical += (goal * R + e) * charge
-            i, goal, dt = 0.0, onward, rest
+            i = 0.0
+            goal, dt = onward, rest
         charge = goal * dt + (i - end) * share
         total += charge
         electrical += (goal * R + e) * charge
@@ -83,8 +43,8 @@ def _careful(i: float, pieces: Array, e: float, V: float, R: float, L: float) ->
 
 
 @compiled
-def _passage(table: Table, joint: int, i: float, value: int, e: float) -> tuple[float, float, float]:
-    """Return the current after a period [A], its charge [A s] and energy [J]: constant + by_i i + by_e e, if it keeps its sign."""
+def _passage(table: PeriodTable, joint: int, i: float, value: int, e: float) -> tuple[float, float, float]:
+    """Return current [A], charge [A s] and energy [J] of a period: constant + by_i i + by_e e, while i keeps its sign."""
     found = table.linear[1 if i > 0.0 else 0, value, joint]
     last = found.shape[1] - 1
     now = 0.0
@@ -97,7 +57,7 @@ def _passage(table: Table, joint: int, i: float, value: int, e: float) -> tuple[
 
 
 @compiled
-def periods(table: Table, loops: Loops, windings: Windings, wanted: Array, emf: Array) -> Array:
+def periods(table: PeriodTable, loops: Loops, windings: Windings, wanted: Array, emf: Array) -> Array:
     """Advance windings by PWM periods.
 
     In each, v = kp (i_ref - i) + sum + known e within its limit; the integrator rests while v is at it.
@@ -119,8 +79,10 @@ def periods(table: Table, loops: Loops, windings: Windings, wanted: Array, emf: 
     done = np.empty((4, *emf.shape))
     for sim in range(wanted.shape[0]):
         for joint in range(wanted.shape[1]):
-            kp, ki, most = loops.kp[sim, joint], loops.ki[sim, joint], loops.most[sim, joint]
-            i, total, electrical = windings.i[sim, joint], windings.sum[sim, joint], windings.electrical[sim, joint]
+            kp, ki = loops.kp[sim, joint], loops.ki[sim, joint]
+            most = loops.most[sim, joint]
+            i, total = windings.i[sim, joint], windings.sum[sim, joint]
+            electrical = windings.electrical[sim, joint]
             for k in range(len(emf)):
                 e = emf[k, sim, joint]
                 error = wanted[sim, joint] - i
@@ -134,9 +96,10 @@ def periods(table: Table, loops: Loops, windings: Windings, wanted: Array, emf: 
                 if math.isfinite(asked) and math.isfinite(e):
                     i, charge, energy = _passage(table, joint, i, int(steps) + table.highest, e)
                 else:  # of no size, as those who command it will be told
-                    i, charge, energy = math.nan, math.nan, math.nan
+                    i = charge = energy = math.nan
                 electrical += energy
                 done[0, k, sim, joint] = charge
                 done[2, k, sim, joint] = i
-            windings.i[sim, joint], windings.sum[sim, joint], windings.electrical[sim, joint] = i, total, electrical
+            windings.i[sim, joint], windings.sum[sim, joint] = i, total
+            windings.electrical[sim, joint] = electrical
     return done

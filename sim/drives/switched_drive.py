@@ -7,8 +7,8 @@ from pydantic import Field
 
 from idbench.sim.drives.averaged_drive import limits
 from idbench.sim.drives.drive import AbstractAmplifier, AbstractDrive, BetweenEdges, Electric, Trace, every
+from idbench.sim.drives.loops import Loops, Windings
 from idbench.sim.drives.passages import passages
-from idbench.sim.drives.periods import Loops, Windings
 from idbench.sim.drives.pwm import Modulation, Modulator, pieces
 from idbench.sim.drives.winding import Winding, stretches
 from idbench.sim.errors import ScenarioError

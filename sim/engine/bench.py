@@ -68,7 +68,7 @@ class Bench:
         task = Task(scenario.nominal_robot, planned, nsim, vary if informed else {})
         self._law = _started(scenario.controller, scenario.controller.start(task), AbstractLaw)
         self._drive = _started(scenario.drive, scenario.drive.start(robot, nsim, self._h), AbstractAmplifier)
-        self._ripple = scenario.ripple.start(robot)
+        self._ripple, self._smooth = scenario.ripple.start(robot), scenario.ripple.steady
         friction, encoder = scenario.friction, scenario.encoder
         self._friction = _started(friction, friction.start(self._plant.joints, self._plant.Fs, self._h), AbstractContact)
         self._encoder = _started(encoder, encoder.start(n, samples, fs, generators(seeds, 0)), AbstractReader)
@@ -140,13 +140,13 @@ class Bench:
         rate = (rotor_qd - self._qd) / (self._steps * self._h)  # accelerating as in the steps before
         mid_qd, mid_q = rotor_qd + rate * t, rotor_q + rotor_qd * t + rate * half_square
         self._qd, self._steps = rotor_qd.copy(), steps
-        constant = 1 + self._ripple.commutation.at(mid_q)
+        constant = None if self._smooth else 1 + self._ripple.commutation.at(mid_q)
         apart = self._plant.has_play and not before_gear
         self._drive.sees(mid_q + (q - rotor_q) + (qd - rotor_qd) * t if apart else mid_q)
-        electric = self._drive.step(self._demand, mid_qd * constant, steps)
+        electric = self._drive.step(self._demand, mid_qd if constant is None else mid_qd * constant, steps)
         expect(self._drive, "step", electric, (1, *self._each), (steps, *self._each))
         self._sensor.take(electric, steps * self._h)
-        tau = electric * constant + self._ripple.cogging.at(mid_q)
+        tau = electric if constant is None else electric * constant + self._ripple.cogging.at(mid_q)
         self._friction.driven(tau[0])
         resistance = self._friction.torque(mid_qd[0])
         expect(self._friction, "torque", np.asarray(resistance), (), self._each)
@@ -184,7 +184,7 @@ class Bench:
             self._watcher.tell(self._final(step), self._planned, channels, self._drive)
 
     def _middles(self, steps: int) -> tuple[Array, Array]:
-        """Return the middle t of each of the steps to come [s], shape (steps, 1, 1), or of all for steady parts, and t^2 / 2."""
+        """Return the middle t of each step to come [s], shape (steps, 1, 1), or of all for steady parts, and t^2 / 2."""
         if steps not in self._instants:
             count = 1 if self._steady else steps
             t = np.linspace(0.5, count - 0.5, count)[:, None, None] * (steps / count * self._h)
@@ -201,7 +201,7 @@ class Bench:
             expect(self._encoder, "read", q, self._each)
             self._before, self._command = self._command, expect(self._law, "command", self._law.command(k, q), self._each)
             self._measured[k], self._commands[k] = q, self._command
-            self._demand = clock.old * self._before + (1 - clock.old) * self._command
+            self._demand = self._command if clock.old == 0 else clock.old * self._before + (1 - clock.old) * self._command
         elif after == 1:
             self._demand = self._command
         if after == 0 and (self._steady or clock.old > 0):

@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from idbench.sim.drives import SwitchedDrive
-from idbench.sim.drives import switched_drive as switched
+from idbench.sim.drives.loops import Loops, Windings
 from idbench.sim.drives.passages import ExactPassages, TabulatedPassages
 from idbench.sim.drives.pwm import Modulator, pieces
 from idbench.sim.drives.winding import Winding, pass_period
@@ -143,34 +143,47 @@ def test_a_window_of_a_batch_gives_the_same_bits(rng):
             np.testing.assert_array_equal(part, whole[rows])
 
 
-@pytest.mark.parametrize("modulation", ["unipolar", "bipolar", "sign_magnitude"])
-def test_one_winding_at_a_time_has_the_bits_of_all_together(modulation, monkeypatch):
-    """Through reversals of the current and dead times, with commands and speeds drawn at random."""
-    robot, rng = Robot.load("scara"), np.random.default_rng(4)
-    drive = SwitchedDrive(modulation=modulation)
-    demands, speeds = rng.uniform(-8, 8, (60, 2, 2)) * [1.0, 0.1], rng.uniform(-4, 4, (60, 5, 2, 2))
-    done = []
-    for few in (0, 8):
-        monkeypatch.setattr(switched, "FEW", few)
-        amplifier = drive.start(robot, 2, 2e-4)
-        steps = zip(demands, speeds, strict=True)
-        done.append([(amplifier.step(u, w, 5), *amplifier.trace, amplifier.copper) for u, w in steps])
-    for together, alone in zip(*done, strict=True):
-        for x, y in zip(together, alone, strict=True):
-            np.testing.assert_array_equal(x, y)
-    assert any((trace[3] * trace[4] < 0).any() for trace in done[0])  # currents do reverse
+def loops(shape, most=0.9 * V):
+    one = np.ones(shape)
+    return Loops(20.0 * one, 2.0 * one, most * one, 0.8)
 
 
 @pytest.mark.parametrize("modulation", ["unipolar", "bipolar", "sign_magnitude"])
-def test_the_table_has_the_passages_that_are_computed(modulation):
-    """To rounding, of coefficients that are differences of currents up to V/R."""
-    rng, shape, h = np.random.default_rng(5), (40, 2), 2e-4
-    winding = Winding(*(np.broadcast_to(x, shape).copy() for x in ([100.0, 60.0], [1.5, 3.0], [2e-3, 5e-3])))
-    modulator = Modulator(modulation, h, 520e-9)
-    for _ in range(5):
-        i, e = rng.uniform(-1, 1, shape) * rng.choice([0.01, 1.0, 20.0], shape), rng.uniform(-30, 30, shape)
-        m = rng.integers(-480, 481, shape) * 0.002
-        kinds = ExactPassages(winding, modulator), TabulatedPassages(winding, modulator, 0.002)
-        made = [kind.through(i, m, e) for kind in kinds]
-        for exact, tabulated in zip(*made, strict=True):
-            np.testing.assert_allclose(tabulated, exact, atol=1e-12 * max(1.0, np.abs(exact).max()))
+@pytest.mark.parametrize("dead_time", [0.0, 520e-9])
+def test_tabulated_periods_are_those_that_are_computed(modulation, dead_time, rng):
+    """Through limits, reversals of the current and dead times; to rounding, of coefficients that are differences of V/R."""
+    shape, modulator = (8, 2), Modulator(modulation, T, dead_time)
+    kinds = [kind(winding(shape), modulator, 0.002) for kind in (ExactPassages, TabulatedPassages)]
+    wanted, emf = rng.uniform(-8, 8, (40, *shape)) * rng.choice([0.02, 1.0], shape), rng.uniform(-30, 30, (40, 5, *shape))
+    states = [Windings(*np.zeros((3, *shape))) for _ in kinds]
+    turned = limited = False
+    for u, e in zip(wanted, emf, strict=True):
+        exact, tabulated = (kind.advance(loops(shape), state, u, e) for kind, state in zip(kinds, states, strict=True))
+        np.testing.assert_allclose(tabulated, exact, atol=1e-11 * max(1.0, np.abs(exact).max()))
+        turned |= (exact[1] * exact[2] < 0).any()
+        limited |= (np.abs(exact[3]) > 0.89).any()
+    assert turned
+    assert limited
+    for exact, tabulated in zip(*states, strict=True):
+        np.testing.assert_allclose(tabulated, exact, atol=1e-10 * np.abs(exact).max())
+
+
+@pytest.mark.parametrize("resolution", [0.001, 0.0])
+def test_a_drive_gives_the_same_bits_alone_and_together(resolution, rng):
+    robot, drive = Robot.load("scara"), SwitchedDrive(duty_resolution=resolution)
+    demands, speeds = rng.uniform(-8, 8, (30, 3, 2)), rng.uniform(-4, 4, (30, 5, 3, 2))
+    together = drive.start(robot, 3, T)
+    alone = [drive.start(robot, 1, T) for _ in range(3)]
+    for u, w in zip(demands, speeds, strict=True):
+        whole = together.step(u, w, 5)
+        for sim, one in enumerate(alone):
+            np.testing.assert_array_equal(one.step(u[sim : sim + 1], w[:, sim : sim + 1], 5)[:, 0], whole[:, sim])
+    np.testing.assert_array_equal(np.concatenate([one.copper for one in alone]), together.copper)
+
+
+def test_what_is_commanded_of_no_size_has_no_current():
+    """And the other windings go on."""
+    amplifier = SwitchedDrive().start(Robot.load("scara"), 2, T)
+    tau = amplifier.step(np.array([[np.nan, 1.0], [1.0, 1.0]]), np.zeros((3, 2, 2)), 3)
+    assert np.isnan(tau[:, 0, 0]).all()
+    assert np.isfinite(np.delete(tau.reshape(3, -1), 0, axis=1)).all()
