@@ -23,8 +23,9 @@ SMOOTHING = 0.15
 KNOTS = 25.0
 """Frequency [Hz] at which slopes are computed; between them cubics go through them, since motion has little beyond 5 Hz."""
 
-MAX_BLOCK = 2_000_000
-"""Samples times columns of which slopes are computed at once: columns of many joints take much memory."""
+MAX_BLOCK, OF_A_LINK = 2_000_000, 100
+"""Values of motions and forces that are kept at once, and how many a link has for each joint that is moved: 24 each in four
+states."""
 
 SLIDING = 2 * STEP_QD
 """Least speed [rad/s] at which slopes are taken, so that friction does not change its sign within a difference."""
@@ -73,7 +74,7 @@ class Linearization:
         # Beyond the last sample the motion stays as it is: a place to interpolate to.
         knots = np.minimum(np.arange(0, last + self._every, self._every), last)
         runs = np.prod(state.q.shape[:-2], dtype=int)
-        each = max(1, MAX_BLOCK // (self.basis.n**2 * len(self.basis.names) * max(runs, 1)))
+        each = max(1, MAX_BLOCK // (self.basis.n**2 * OF_A_LINK * max(runs, 1)))
         pieces = []
         for part in np.split(knots, range(each, len(knots), each)):
             conditions = {name: x[..., part] for name, x in state.conditions.items()}

@@ -37,7 +37,7 @@ MOVED = {"scara": {"trajectory": RandomMoves(durations=(0.8, 1.4), rest=0.2)}}
 DEFINITION = """title = "{title}"
 fit = ["fit.parquet"]
 held_out = ["true.parquet"]
-options = "--robot {arm} --model explicit --torque-delay estimate{options}"
+identify = {{robot = "{arm}", model = "explicit", torque_delay = "estimate"{more}}}
 delay_told = false
 """
 
@@ -52,13 +52,13 @@ class Imperfection:
         Each returns a scenario with something imperfect, by the rms torques.
     delay : float
         Of the logged torques [s].
-    options : str
-        Further options of idbench.
+    more : str
+        Further keys of idbench.
     """
 
     changes: tuple[Callable[[Scenario, Array], Scenario], ...] = ()
     delay: float = 0.0
-    options: str = ""
+    more: str = ""
 
 
 def noisy(plain: Scenario, torques: Array) -> Scenario:
@@ -81,7 +81,7 @@ IMPERFECTIONS = {
     "delay": Imperfection(delay=DELAY),
     "friction by load": Imperfection((loaded,)),
     "all four": Imperfection((noisy, rounded, loaded), DELAY),
-    "all four, law chosen": Imperfection((noisy, rounded, loaded), DELAY, " --friction auto"),
+    "all four, law chosen": Imperfection((noisy, rounded, loaded), DELAY, ', friction = ["auto"]'),
 }
 """By the names of tables."""
 
@@ -115,7 +115,7 @@ def write_arm(folder: Path, arm: str, scenario: str, seeds: int) -> None:
         for seed in range(seeds):
             place = folder / f"{arm}-{name.replace(',', '').replace(' ', '-')}-{seed}"
             log = late(simulate(moving(changed, seed)).alone(), imperfection.delay)
-            write(place, log, true, title=f"{arm}; {name}; {seed}", arm=arm, options=imperfection.options)
+            write(place, log, true, title=f"{arm}; {name}; {seed}", arm=arm, more=imperfection.more)
         print(f"{arm}: {name}", flush=True)
 
 
