@@ -30,7 +30,7 @@ from idbench.experiments.judgement.warnings import (
 )
 from idbench.experiments.text import error_percentage
 from idbench.identify import IdentificationError, RangeError, WeightedLeastSquares, estimate, validate
-from idbench.identify.judge.delay import estimate_delay
+from idbench.identify.judge.delay import estimate_delay, nearby_delay
 from idbench.identify.judge.small_mistakes import WORTH as WORTH_A_WORD
 from idbench.identify.judge.stretches import held_out_errors
 from idbench.identify.telling import stage
@@ -62,6 +62,9 @@ def delay_advice(result: Fit) -> Iterator[str]:
     if wrong_sign(result) or logs[0].poses or result.robot_model.asked.prior:
         return
     try:
+        near = nearby_delay(result.problem)
+        if SURE * near.doubt < 1 / logs[0].fs and abs(near.delay - assumed) <= SURE * near.doubt:
+            return  # a search would end here
         measured = estimate_delay(list(logs), result.basis, result.processing)
     except RangeError as error:
         yield f"the delay of the torque is far from the assumed one, or unrelated to this motion: {error}"

@@ -151,10 +151,7 @@ def estimate_joint_delays(
         found = DelayEstimate(mean, tuple(sigma.tolist()), tuple((delays - mean).tolist()))
         delayed = [replace(one, torque=found.of(one.torque)) for one in logs]
         problem = Problem(tuple(delayed), basis, ExplicitModel(), chain or idbench_chain())
-        D = [np.stack(part.delay_slopes(each=True), axis=-1) for part in problem.parts]
-        each = zip(problem.parts, D, strict=True)
-        A = _white(problem, [np.column_stack([part.unbiased.W, -slopes, part.rows.Y]) for part, slopes in each])
-        steps, whole = _left_out(A[:, :-1], A[:, -1], basis.n)
+        steps, whole = _steps_of(problem, each=True)
         shown = np.isfinite(whole)  # not of a joint without torque
         delays, sigma = delays + np.where(shown, whole, 0.0), np.where(shown, _jackknife(steps), 0.0)
         if (np.abs(whole[shown]) < SETTLED * sigma[shown]).all():
@@ -162,6 +159,26 @@ def estimate_joint_delays(
     raise RangeError(
         "the delays of the joints do not settle: does the model fit the robot? `estimate` finds one delay for all joints"
     )
+
+
+def nearby_delay(problem: Problem) -> DelayEstimate:
+    """Return the delay by one step of generalized least squares from the stated one, from rows that are there: of one nearby.
+
+    Parameters
+    ----------
+    problem : Problem
+        Logs with one torque channel, and their rows.
+    """
+    steps, (whole,) = _steps_of(problem.explicit, each=False)
+    return DelayEstimate(problem.logs[0].torque.delay + float(whole), float(_jackknife(steps)[0]))
+
+
+def _steps_of(problem: Problem, each: bool) -> tuple[Array, Array]:
+    """Return steps of the delay, or of each joint's, without each block of rows, and of all: Y + D delta = W X."""
+    D = [np.stack(part.delay_slopes(each), axis=-1) for part in problem.parts]
+    parts = zip(problem.parts, D, strict=True)
+    A = _white(problem, [np.column_stack([part.unbiased.W, -slopes, part.rows.Y]) for part, slopes in parts])
+    return _left_out(A[:, :-1], A[:, -1], D[0].shape[-1])
 
 
 def _is_read(logs: Sequence[MotionLog], chain: Chain) -> bool:
