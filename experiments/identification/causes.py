@@ -39,8 +39,10 @@ WORDINGS: Mapping[tuple[str, str], Wording] = {
         "torque constant that falls with the torque, or a limit", by="move more slowly, or with lighter loads"
     ),
     ("dead_band", "torque"): Wording("dead band of the torque, {size}", by="calibrate it"),
-    ("delay", "torque"): Wording("torque {late} by {size}, or lagging", "--torque-delay {delay}"),
-    ("delay", "position"): Wording("position {late} by {size}, or lagging", by="correct the delay of its position"),
+    ("delay", "torque"): Wording("torque acts {late} than the log says, by {size}, or lags", "--torque-delay {delay}"),
+    ("delay", "position"): Wording(
+        "position was measured {late} than the log says, by {size}, or lags", by="correct the delay of its position"
+    ),
     ("zero", "position"): Wording(
         "zero of the position off by {size}", by="subtract it from the joint's positions, or turn the link's frame in the file"
     ),
@@ -203,9 +205,10 @@ class Cause:
         if s.cause in LENGTHS:
             size, sigma = (float(np.linalg.norm(x[:2])) for x in (s.size, s.sigma))
         unit = f" {self._unit}"
-        if s.unit == "1":
-            size, sigma = 100 * size, 100 * sigma
-            unit = " %"
+        for of, scale, shown in (("1", 100, "%"), ("s", 1000, "ms")):
+            if s.unit == of:
+                size, sigma = scale * size, scale * sigma
+                unit = f" {shown}"
         if any(word in self._wording.what for word in ("{large}", "{late}", "{faster}")):
             size = abs(size)
         j = s.joint or 0
@@ -217,7 +220,7 @@ class Cause:
             "size": f"{concise(size, sigma)}{unit}" if sigma else f"{size:.3g}{unit}",
             "instant": "" if s.instant is None else f"{s.instant:.1f} s{'' if s.log is None else f' of log {s.log + 1}'}",
             "large": "large" if s.size[0] > 0 else "small",
-            "late": "late" if s.size[0] > 0 else "early",
+            "late": "earlier" if s.size[0] > 0 else "later",
             "faster": "faster" if s.size[0] > 0 else "slower",
             "axis": "xyz"[int(s.setting)] if s.cause == "length" else "",
             "laws": self._laws(self._wording.law.format(setting=s.setting)),

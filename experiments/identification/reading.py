@@ -210,8 +210,7 @@ def _delayed(read: ReadLog, every: Mapping[str, DelayEstimate], unknown: Mapping
         return replace(read, notes=(*read.notes, f"{unknown[meaning]}; {read.channel.delay:g} s is assumed"))
     found = every[meaning]
     logs = tuple(with_delay(log, found) for log in read.logs)
-    notes = (*read.notes, f"torque delay estimated from the log: {found.words}")
-    return replace(read, logs=logs, channel=found.of(read.channel), notes=notes)
+    return replace(read, logs=logs, channel=found.of(read.channel))
 
 
 def late(read: ReadLog, channel: TorqueChannel) -> ReadLog:

@@ -174,7 +174,8 @@ def checks(judgement: Judgement, *, delay: bool, trials: bool = True) -> dict[st
         # Friction absorbs a wrong delay, and the verdict may be good: the log itself is asked.
         found[DELAY] += delay_advice(result) if delay else ()
         found[MODEL] += Remedies(hardest).options() if trials and not judgement.good else ()
-    found[MODEL] += [cause.advice for cause in result.diagnosis or ()]
+    told = {"delay"} if found[DELAY] else set()
+    found[MODEL] += [cause.advice for cause in result.diagnosis or () if cause.suspect.cause not in told]
     return found
 
 

@@ -163,7 +163,7 @@ class Page(Console):
         text = self.file.getvalue()
         self.file.seek(0)
         self.file.truncate()
-        self._write(self._people, text)
+        self._write(self._people, "\n".join(line.rstrip(" ") for line in text.split("\n")))  # tables fill up their columns
 
     def end(self) -> None:
         """Show the rest, and what a program reads."""
