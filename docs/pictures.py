@@ -124,8 +124,9 @@ def make(names: list[str]) -> None:
                         sys.exit(f"{command} failed")
             with viewer(Path(folder)) as client:  # one a picture: a viewer keeps the layout that it opens first
                 take(client, done[picture.commands], picture, DOCS / name)
-            if (report := done[picture.commands] / "report.html").is_file():
-                photograph(report, DOCS / f"{picture.commands[0].split()[0]}.png")
+            page = DOCS / f"{picture.commands[-1].split()[0]}.png"
+            if (report := done[picture.commands] / "report.html").is_file() and page.is_file():
+                photograph(report, page)
 
 
 def called(name: str, picture: Picture) -> str:

@@ -28,7 +28,7 @@ from idbench.experiments.recording.motion_layer import Base
 from idbench.experiments.recording.scales import listed, signed
 from idbench.experiments.recording.stream import Stream
 from idbench.experiments.reports.estimates import markdown
-from idbench.experiments.text import FORM_WIDTHS, FORMS, GREY, joint_colors, lighter, model_color, percent
+from idbench.experiments.text import FORM_WIDTHS, FORMS, GREY, joint_colors, lighter, model_color
 from idbench.sim.scenario.scenario_file import to_toml
 
 
@@ -56,6 +56,9 @@ def record_table1(table: Table1, audience: Audience | None = None) -> list[tuple
 
 BEND = 0.01
 """Error [%] up to which axes are linear."""
+
+NOUGHT = 0.005
+"""Error [%] below which there is none at two decimals."""
 
 NOTABLE = 1.0
 """Error [%] from which on it is written in bold."""
@@ -99,7 +102,10 @@ def _send_causes(stream: Stream, table: Table2, form: str) -> None:
 
 
 def _emphasized(error_percent: float) -> str:
-    return f"**{percent(error_percent)}**" if abs(error_percent) > NOTABLE else percent(error_percent)
+    if abs(error_percent) < NOUGHT:
+        return "0"
+    shown = f"{error_percent:+.2f}" if abs(error_percent) < 100 else f"{error_percent:+.0f}"
+    return f"**{shown}**" if abs(error_percent) > NOTABLE else shown
 
 
 def _markdown(table: Table2) -> str:

@@ -8,12 +8,13 @@ import numpy as np
 import numpy.typing as npt
 
 from idbench.experiments.identification.fit import Fit
+from idbench.experiments.judgement.warnings import WEAK
 from idbench.experiments.recording.chart import NARROW, SQUARE, SYMBOLS, Chart
 from idbench.experiments.recording.columns import part
-from idbench.experiments.recording.scales import Signed, Words, decades, linear, listed
+from idbench.experiments.recording.scales import Linear, Signed, Words, decades, linear, listed
 from idbench.experiments.recording.stream import Stream
 from idbench.experiments.reports.friction_curves import FRICTIONS, FrictionCurves, Spectrum, left_over, of_joints, spectra
-from idbench.experiments.text import GREY, JOINTS, SIGMAS, Color, model_color, percentage
+from idbench.experiments.text import GREY, JOINTS, SIGMAS, Color, model_color
 from idbench.identify import Array, Estimate, Instants, binned, cutoffs
 
 LINEAR_UP_TO = 1e-3
@@ -46,20 +47,24 @@ def _send(stream: Stream, at: str, estimate: Estimate) -> None:
 MAX_ROWS = 13
 """Parameters of a single chart; more have a chart for each joint."""
 
+WHOLE, LEAST = 100.0, 0.01
+"""How far axes of parameters go at most, and at least [%]."""
+
 ASIDE = 0.22
 """How far the models of a parameter stand apart, of its room."""
 
 
 def send_parameters(stream: Stream, at: str, fit: Fit, number: int = 0) -> None:
-    """Send every parameter's error, or its deviation from the first model's, in standard errors; and the singular values."""
-    reference, unit = _reference(fit), next(iter(fit.estimates.values())).standard_errors
-    relative = 100 * unit / np.where(reference == 0, np.nan, np.abs(reference))
-    off = {form: (estimate.X - reference) / unit for form, estimate in fit.estimates.items()}
-    reach = {form: SIGMAS * estimate.standard_errors / unit for form, estimate in fit.estimates.items()}
-    scale = _scale(fit, [np.abs(off[form]) + reach[form] for form in off])
-    for k, (title, members) in enumerate(_parts(fit, np.nan_to_num(relative, nan=np.inf))):
-        names = [_label(fit.basis.names[p], relative[p]) for p in members]
-        chart = Chart(stream, f"{at}/parameters/{k:02}/{part(title)}", scale, listed("", names), SQUARE)
+    """Send every parameter's error, or its difference from the first model's, in % of its value; and the singular values."""
+    reference = _reference(fit)
+    size = np.where(reference == 0, np.nan, np.abs(reference)) / 100
+    off = {form: (estimate.X - reference) / size for form, estimate in fit.estimates.items()}
+    reach = {form: SIGMAS * estimate.standard_errors / size for form, estimate in fit.estimates.items()}
+    unsure = next(iter(reach.values())) > SIGMAS * 100 * WEAK
+    for k, (title, members) in enumerate(_parts(fit)):
+        names = [f"{fit.basis.names[p]}{'?' * bool(unsure[p])}" for p in members]
+        far = [np.where(unsure, np.nan, np.abs(off[form]) + reach[form])[members] for form in off]
+        chart = Chart(stream, f"{at}/parameters/{k:02}/{part(title)}", _scale(fit, far), listed("", names), SQUARE)
         ends = np.array([-0.5, len(members) - 0.5])
         chart.line("true" if fit.truth else next(iter(fit.estimates)), np.zeros(2), ends, GREY, listed=False)
         for i, form in enumerate(fit.estimates):
@@ -71,21 +76,15 @@ def send_parameters(stream: Stream, at: str, fit: Fit, number: int = 0) -> None:
     _singular_values(stream, at, fit, number)
 
 
-def _label(name: str, relative: float) -> str:
-    """Return a parameter with its %sigma."""
-    return f"{name} {percentage(relative)} %" if np.isfinite(relative) else f"{name} = 0"
-
-
-def _parts(fit: Fit, relative: Array) -> Iterator[tuple[str, npt.NDArray[np.intp]]]:
-    """Yield title and parameters of each chart: all of few; of many those of each joint, the least certain first."""
+def _parts(fit: Fit) -> Iterator[tuple[str, npt.NDArray[np.intp]]]:
+    """Yield title and parameters of each chart: all of few; of many those of each joint."""
     every = np.array(fit.basis.without_random_effects)
     if len(every) <= MAX_ROWS:
         yield "all", every
         return
     joints = np.array([fit.basis.parameters[p].joint or 0 for p in every])
     for j in np.unique(joints):
-        mine = every[joints == j]
-        yield fit.robot_model.robot.joints[j], mine[np.argsort(-relative[mine], kind="stable")]
+        yield fit.robot_model.robot.joints[j], every[joints == j]
 
 
 def _reference(fit: Fit) -> Array:
@@ -93,12 +92,12 @@ def _reference(fit: Fit) -> Array:
     return np.array(list(fit.truth.values())) if fit.truth else next(iter(fit.estimates.values())).X
 
 
-def _scale(fit: Fit, farthest: Sequence[Array]) -> Signed:
-    """Return an axis for all parameters, in standard errors of the first model."""
-    first, every = next(iter(fit.estimates)), np.concatenate(farthest)
-    high = 1.3 * max(2 * SIGMAS, float(np.max(every, where=np.isfinite(every), initial=0.0)))
-    what = "error" if fit.truth else f"difference from {first}"
-    return Signed(f"{what} / sigma of {first}; bars: 2 sigma", -high, high, 1.0)
+def _scale(fit: Fit, farthest: Sequence[Array]) -> Linear:
+    """Return an axis, in % of the values, for parameters that are known; what is beyond its ends lies there."""
+    every = np.concatenate(farthest)
+    high = min(1.1 * float(np.max(every, where=np.isfinite(every), initial=LEAST)), WHOLE)
+    what = "error" if fit.truth else f"difference from {next(iter(fit.estimates))}"
+    return Linear(f"{what} [% of the value]; bars: 95 %", -high, high)
 
 
 def _singular_values(stream: Stream, at: str, fit: Fit, number: int) -> None:

@@ -20,7 +20,7 @@ from idbench.experiments.recording.views import (
     window,
 )
 from idbench.experiments.text import UNITS
-from idbench.identify import BLOCKS
+from idbench.identify import BLOCKS, scara
 from idbench.identify.basis.tree_links import KINDS
 
 DIGITS = "0123456789"
@@ -260,4 +260,5 @@ def _known_units() -> dict[str, str]:
     """Return the units of the parameters of links and of the blocks that are built in, by their letters."""
     blocks = [BLOCKS.create(name) for name in BLOCKS.builtin]
     each = [parameter for block in blocks for parameter in block.parameters(2)]
-    return {x: unit for x, (_, unit) in KINDS.items()} | {_letters(p.name): p.unit for p in each}
+    every = (*each, *scara().parameters)
+    return {x: unit for x, (_, unit) in KINDS.items()} | {_letters(p.name): p.unit for p in every}

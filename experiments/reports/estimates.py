@@ -48,8 +48,8 @@ class EstimatesTable:
     def short(self) -> Iterator[list[str]]:
         """Yield the truth and the estimates alone, with all marks."""
         for i, name in self._shown:
-            values = (f"{e.X[i]:.4g}{''.join(self._marks[m][i]).strip()}" for m, e in self.estimates.items())
-            yield [name, *self._true(i), *values]
+            each = ((e.X[i], e.standard_errors[i], self._marks[m][i]) for m, e in self.estimates.items())
+            yield [name, *self._true(i), *(f"{concise(x, sigma)}{''.join(marks).strip()}" for x, sigma, marks in each)]
 
     def whole(self) -> Iterator[list[str]]:
         """Yield the cells of what is said of each fit as a whole."""

@@ -115,8 +115,8 @@ def _told(fit: Fit) -> Iterator[str]:
         yield "; ".join(f"{what}: {', '.join(words)}" for what, words in known if words)
     if not fit.logs.fitted[0].poses:
         sure = np.atleast_1d(channel.delay_sigma)
-        sigma = f", estimated from the log, sigma {', '.join(f'{1e3 * x:.2g}' for x in sure)} ms" if sure.any() else ""
-        yield f"torque: {channel.meaning}, delay {channel.late}{sigma}{ignored if logged else ''}"
+        how_sure = f", estimated from the log, sigma {', '.join(f'{1e3 * x:.2g}' for x in sure)} ms" if sure.any() else ""
+        yield f"torque: {channel.meaning}, delay {channel.late}{how_sure}{ignored if logged else ''}"
     if fit.delay is not None:
         delay, sigma = (1e3 * x for x in fit.delay)
         words = f"delay found with the parameters: {delay:.4g} ms, sigma {sigma:.2g} ms"
