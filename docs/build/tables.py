@@ -24,17 +24,8 @@ from reversal_tables import reversals
 from simulated_tables import SIMULATED_TABLES
 
 sys.path.insert(0, str(DOCS.parent))
-PAGES = (
-    "answers.md",
-    "any-arm.md",
-    "estimators.md",
-    "excitation.md",
-    "noise.md",
-    "appendix.md",
-    "benchmark.md",
-    "conclusion.md",
-)
 MARK = re.compile(r"<!-- table: ([\w-]+) -->\n.*?<!-- end -->", re.DOTALL)
+PAGES = sorted(path.name for path in DOCS.glob("*.md") if MARK.search(path.read_text()))
 
 I, P = "idbench", "paper"
 FOUR: Sequence[Column] = ((I, "explicit"), (I, "power"), (P, "explicit"), (P, "power"))
