@@ -1,6 +1,7 @@
 """Running a command: its words, its errors, its end."""
 
 import os
+import re
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import redirect_stdout, suppress
@@ -117,10 +118,14 @@ def _together() -> SubcommandApp:
 
 def completion(shell: str) -> str:
     """Return the script that lets bash, zsh or fish complete commands and options."""
-    script = StringIO()
+    script, every = StringIO(), SubcommandApp()
+    for name, options in COMMANDS.items():
+        every.command(name=name)(typed(options))
     with redirect_stdout(script), suppress(SystemExit):  # the parser ends its process after the script
-        _together().cli(prog="idbench", args=["--tyro-print-completion", shell])
-    return script.getvalue().replace("complete -F ", "complete -o default -F ")  # files, where bash has no words
+        every.cli(prog="idbench", args=["--tyro-print-completion", shell])
+    found = script.getvalue().replace("complete -F ", "complete -o default -F ")  # files, where bash has no words
+    # What an option has without a word is no word of it.
+    return re.sub(r"'None', |, 'None'(?=\])", "", found.replace("{None}|", "").replace("{None,", "{"))
 
 
 def command(name: str) -> Callable[[type], type]:

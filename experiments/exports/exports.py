@@ -66,19 +66,19 @@ class FileKind:
 def mjcf(fit: Fit, model: str, path: Path) -> Exported:
     """Return the robot's file with the parameters, made physically consistent."""
     written = WrittenRobot(fit, model)
-    return Exported({path: written.text(path.absolute().parent)}, written.warnings)
+    return Exported({path: _marked(written.text(path.absolute().parent), fit, model)}, written.warnings)
 
 
 def urdf(fit: Fit, model: str, path: Path) -> Exported:
     """Return the robot as URDF with the parameters."""
     text, warnings = robots.urdf(WrittenRobot(fit, model))
-    return Exported({path: text}, warnings)
+    return Exported({path: _marked(text, fit, model)}, warnings)
 
 
 def sdf(fit: Fit, model: str, path: Path) -> Exported:
     """Return the robot as SDF with the parameters."""
     text, warnings = robots.sdf(WrittenRobot(fit, model))
-    return Exported({path: text}, warnings)
+    return Exported({path: _marked(text, fit, model)}, warnings)
 
 
 def actuators(fit: Fit, model: str, path: Path) -> Exported:
@@ -122,9 +122,22 @@ def training_ranges(fit: Fit, model: str, path: Path) -> Exported:
 def _content(fit: Fit, model: str, path: Path) -> Content:
     estimate = fit.estimates[model]
     functions = require_formulas(estimate.problem.basis, fit.robot_model.tree, path)
+    return Content(
+        functions, estimate.X.tolist(), estimate.standard_errors.tolist(), interval_of(fit, model), _origin(fit, model)
+    )
+
+
+def _origin(fit: Fit, model: str) -> str:
     logs = ", ".join(fit.logs.names) or "a log"
-    origin = f"identified from {logs} by {fit.request.estimator} of the {model} model, idbench {version('idbench')}"
-    return Content(functions, estimate.X.tolist(), estimate.standard_errors.tolist(), interval_of(fit, model), origin)
+    return f"identified from {logs} by {fit.request.estimator} of the {model} model, idbench {version('idbench')}"
+
+
+def _marked(text: str, fit: Fit, model: str) -> str:
+    """Return an XML file with a comment that says what it is from, below its declaration."""
+    declared = text.index("?>") + 2 if text.startswith("<?xml") else 0
+    before, after = text[:declared], text[declared:].lstrip("\n")
+    comment = f"<!-- {_origin(fit, model).replace('--', '- -')} -->\n"  # two hyphens would end it
+    return f"{before}\n{comment}{after}" if before else comment + after
 
 
 def require_functions(robot_model: RobotModel, path: Path) -> None:

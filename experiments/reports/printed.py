@@ -116,7 +116,8 @@ def _told(fit: Fit) -> Iterator[str]:
     if not fit.logs.fitted[0].poses:
         sure = np.atleast_1d(channel.delay_sigma)
         how_sure = f", estimated from the log, sigma {', '.join(f'{1e3 * x:.2g}' for x in sure)} ms" if sure.any() else ""
-        yield f"torque: {channel.meaning}, delay {channel.late}{how_sure}{ignored if logged else ''}"
+        early = f" (it is logged {1e3 * -channel.delay:.4g} ms after it acts)" if channel.delay < 0 and not channel.lags else ""
+        yield f"torque: {channel.meaning}, delay {channel.late}{early}{how_sure}{ignored if logged else ''}"
     if fit.delay is not None:
         delay, sigma = (1e3 * x for x in fit.delay)
         words = f"delay found with the parameters: {delay:.4g} ms, sigma {sigma:.2g} ms"

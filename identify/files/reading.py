@@ -120,7 +120,9 @@ class LogFiles:
             every["q"], qd = self._integrated(every["qd"]), None
         q = every["q"]
         if q.shape[1] != tau.shape[1]:
-            raise LogError(f"{self.log}: {q.shape[1]} columns of positions and {tau.shape[1]} of torques: one of each a joint")
+            held = [f"column {name} holds {what}" for table in self.tables.values() for name, what in table.words.items()]
+            why = "; ".join(held[:3]) or "one of each a joint"
+            raise LogError(f"{self.log}: positions of {q.shape[1]} joints and torques of {tau.shape[1]}: {why}")
         if names and len(names) != q.shape[1]:
             raise LogError(f"{self.log}: {len(names)} names of joints, {q.shape[1]} columns of positions")
         t, t_tau = self.times(layout.q if layout.q.columns else layout.qd, len(q)), self.times(layout.tau, len(tau))

@@ -41,7 +41,7 @@ class Body:
     @property
     def six(self) -> list[float]:
         """Inertia: xx, xy, xz, yy, yz, zz."""
-        return [float(x) for x in self.inertia[np.triu_indices(3)]]
+        return [float(x) for x in without_rounding(self.inertia[np.triu_indices(3)])]
 
 
 @final
@@ -112,4 +112,10 @@ def _angles(R: Array) -> Array:
 
 def numbers(values: Array) -> str:
     """Return numbers as such files have them."""
-    return " ".join(repr(float(value)) for value in values)
+    return " ".join(repr(float(value)) for value in without_rounding(values))
+
+
+def without_rounding(values: Array) -> Array:
+    """Return values with 0 for what rounding made of it: less than a share of 1e-12 of the largest, or 1e-15 at all."""
+    size = np.abs(values)
+    return np.where(size <= max(1e-12 * float(np.max(size, initial=0.0)), 1e-15), 0.0, values)

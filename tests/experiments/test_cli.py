@@ -1,6 +1,8 @@
 """The command line as a user meets it: answers and files."""
 
 import json
+import re
+import subprocess
 
 import pytest
 
@@ -113,3 +115,17 @@ def test_shells_complete_every_command_and_its_options(shell, capsys):
     script = capsys.readouterr().out
     assert all(f"'{name}'" in script for name in COMMANDS)
     assert "--torque-delay" in script
+    assert "'--armature'" in script  # of a group of options, whose name is not typed
+    assert not re.search(r"--\w+\.\w", script)
+    assert "None" not in re.sub(r"(?s)\nimport sys.*", "", script)
+
+
+def test_bash_completes_what_is_typed(tmp_path, capsys):
+    assert main(["completion", "bash"]) == 0
+    (tmp_path / "idbench.bash").write_text(capsys.readouterr().out)
+    code = """source idbench.bash; f=$(complete -p idbench | sed 's/.*-F \\([^ ]*\\).*/\\1/')
+    for words in "idbench ident" "idbench identify --torque-d" "idbench identify --arma"; do
+        COMP_WORDS=($words); COMP_CWORD=$((${#COMP_WORDS[@]} - 1)); COMP_LINE=$words; COMP_POINT=${#words}; $f; echo "${COMPREPLY[@]}"
+    done"""
+    done = subprocess.run(["bash", "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["identify", "--torque-delay", "--armature"]

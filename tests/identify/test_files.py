@@ -245,7 +245,7 @@ def test_what_cannot_be_guessed_is_told_in_one_line(tmp_path, write):
         ("[t", "log.toml"),
         ('[q]\ncolumns = "nothing*"', r"has no columns nothing\*; its columns: t, q1"),
         ('[tau]\ncolumns = "gone"', "has no column 'gone'; its columns"),
-        ('[tau]\ncolumns = ["tau1", "tau2"]', "3 columns of positions and 2 of torques"),
+        ('[tau]\ncolumns = ["tau1", "tau2"]', "positions of 3 joints and torques of 2"),
         ("rows = 3", "rows = 3 must be a table"),
         ("[rows]\nt = 100.0", "t is 100.0 in no row; it goes from 0.0 to"),
     ],
