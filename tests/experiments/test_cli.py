@@ -117,7 +117,8 @@ def test_shells_complete_every_command_and_its_options(shell, capsys):
     assert "--torque-delay" in script
     assert "'--armature'" in script  # of a group of options, whose name is not typed
     assert not re.search(r"--\w+\.\w", script)
-    assert "None" not in re.sub(r"(?s)\nimport sys.*", "", script)
+    assert "'None'" not in script
+    assert "{None" not in script
 
 
 def test_bash_completes_what_is_typed(tmp_path, capsys):
@@ -125,7 +126,8 @@ def test_bash_completes_what_is_typed(tmp_path, capsys):
     (tmp_path / "idbench.bash").write_text(capsys.readouterr().out)
     code = """source idbench.bash; f=$(complete -p idbench | sed 's/.*-F \\([^ ]*\\).*/\\1/')
     for words in "idbench ident" "idbench identify --torque-d" "idbench identify --arma"; do
-        COMP_WORDS=($words); COMP_CWORD=$((${#COMP_WORDS[@]} - 1)); COMP_LINE=$words; COMP_POINT=${#words}; $f; echo "${COMPREPLY[@]}"
+        COMP_WORDS=($words); COMP_CWORD=$((${#COMP_WORDS[@]} - 1)); COMP_LINE=$words; COMP_POINT=${#words}
+        $f; echo "${COMPREPLY[@]}"
     done"""
     done = subprocess.run(["bash", "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True)
     assert done.stdout.split() == ["identify", "--torque-delay", "--armature"]

@@ -178,6 +178,10 @@ class Completion(Command, action="completion:complete"):
 
     bash: idbench completion bash > ~/.local/share/bash-completion/completions/idbench
 
+    zsh: idbench completion zsh > ~/.zfunc/_idbench, in a folder of fpath, before compinit
+
+    fish: idbench completion fish > ~/.config/fish/completions/idbench.fish
+
     It completes the word idbench: in a clone, activate .venv first.
     """
 
