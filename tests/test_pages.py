@@ -25,7 +25,7 @@ def tables(root):
 
 
 def test_tables_are_made_of_the_results(root, tables):
-    assert len(tables.PAGES) > 8
+    assert {"benchmark.md", "results-estimators.md", "answers.md"} <= set(tables.PAGES)
     for page in tables.PAGES:
         text = (root / "docs" / page).read_text()
         assert tables.filled(text) == text, f"{page}: uv run python docs/build/tables.py"
