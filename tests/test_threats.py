@@ -137,7 +137,7 @@ def test_servers_are_reached_from_this_machine_alone(monkeypatch):
     monkeypatch.setattr(viewers.subprocess, "Popen", lambda words, **_: started.append(words) or _Ended())
     monkeypatch.setattr(viewers, "answers", lambda _: True)
     monkeypatch.setattr(viewers, "require_display", lambda: None)
-    viewers.spawned()
+    viewers.start_viewer()
     with viewers.served(_free_pair()):
         pass
     assert len(started) == 2

@@ -20,12 +20,12 @@ from idbench.experiments.identification.job import (
     truth_of,
 )
 from idbench.experiments.identification.load import judged_on, prepared, with_held_out
-from idbench.experiments.identification.logs import sought_of
+from idbench.experiments.identification.logs import delay_method
 from idbench.experiments.identification.reading import ReadLog, file_of, late, read
 from idbench.experiments.identification.robot_model import SCARA, RobotModel, absolute
 from idbench.experiments.requests import jobs
 from idbench.experiments.requests.shared import ColumnOptions, LogRequest, MountingOptions, Parameters
-from idbench.experiments.requests.table import keys_of, request_from
+from idbench.experiments.requests.table import request_from, request_keys
 from idbench.identify import BLOCKS, CHAINS, ESTIMATORS, MODELS, MotionLog
 from idbench.identify.plugins import Table, did_you_mean
 from idbench.sim.engine.simulation import simulate as simulated
@@ -93,7 +93,7 @@ def read_log(
     table = keys if torque is None else {**keys, "torque": torque}
     taken = _others((Parameters, MountingOptions), but=True) | {"robot", "mask_speed", "cutoff", "estimator"}
     asked = request_from(LogRequest, table, "read_log", taken=taken)
-    if sought := sought_of(asked.torque_delay):
+    if sought := delay_method(asked.torque_delay):
         raise ExperimentError(f"torque_delay: the robot is needed for it: idbench.fit(..., torque_delay={sought!r})")
     return motion_log(file_of(Path(path)), read_options(asked), robot)
 
@@ -142,7 +142,7 @@ def fit(
     table = named(keys) | ({} if robot is None or model else {"robot": robot})
     paths = {name: tuple(map(Path, given)) for name, given in (("log", logs), ("validate", held_out)) if _files(given)}
     asked = request_from(jobs.IdentifyRequest, table | paths, "fit", taken={"label"})
-    sought = sought_of(asked.torque_delay)
+    sought = delay_method(asked.torque_delay)
     if model is None and _files(logs) and _files(held_out) and truth is None:
         return Identification(identified(asked), sought is None)
     if model is not None:
@@ -217,8 +217,8 @@ def _files(logs: Sequence[Any]) -> bool:
 
 def _others(groups: Sequence[type], *, but: bool = False) -> set[str]:
     """Return the keys of requests of logs that are not those of some groups; `but`: those that are."""
-    own = {key for group in groups for key in keys_of(group)}
-    return own if but else keys_of(LogRequest).keys() - own
+    own = {key for group in groups for key in request_keys(group)}
+    return own if but else request_keys(LogRequest).keys() - own
 
 
 def _name_of(asked: jobs.IdentifyRequest) -> str:
@@ -233,10 +233,10 @@ def _require_logs(logs: Sequence[Any], held_out: Sequence[Any], keys: Mapping[st
     if wrong := [each for each in (*logs, *held_out) if not isinstance(each, AnyLog)]:
         raise ExperimentError(f"fit: {wrong[0]!r:.60} is no log: give a MotionLog, as read_log returns it, or a file")
     reading = {
-        *keys_of(ColumnOptions),
+        *request_keys(ColumnOptions),
         "torque",
         "unwrap",
-        *(() if sought_of(keys.get("torque_delay")) else ("torque_delay",)),
+        *(() if delay_method(keys.get("torque_delay")) else ("torque_delay",)),
     }
     if not _files(logs) and (given := [key for key in keys if key in reading]):
         raise ExperimentError(f"fit: {', '.join(given)} is how a log is read, and this one is: give it to read_log")
@@ -258,7 +258,7 @@ def _require_truth(truth: Mapping[str, float] | None, model: RobotModel) -> None
 def _with_keys(model: RobotModel, asked: jobs.IdentifyRequest, table: Mapping[str, Any]) -> RobotModel:
     """Return a robot with the parameters that keywords ask for beside its own."""
     for group, name in ((Parameters, "parameters"), (MountingOptions, "mounting")):
-        given = {key: getattr(getattr(asked, name), key) for key in keys_of(group) if key in table}
+        given = {key: getattr(getattr(asked, name), key) for key in request_keys(group) if key in table}
         if given and name == "mounting":
             raise ExperimentError(f"fit: {', '.join(given)} is what the robot is loaded with: give it to load_robot")
         if "add" in given:  # beside its own

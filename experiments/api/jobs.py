@@ -19,7 +19,7 @@ from idbench.experiments.paper.table2 import Table2
 from idbench.experiments.requests import jobs
 from idbench.experiments.requests.table import request_from
 from idbench.experiments.servo.job import ServosFit, servos_identified
-from idbench.experiments.study.job import LARGEST_SHARD, pool_of, runs_of_shard
+from idbench.experiments.study.job import LARGEST_SHARD, runs_of_shard, worker_pool
 from idbench.experiments.study.run_study import run_missing
 from idbench.experiments.study.store import Store
 from idbench.experiments.study.study import Study
@@ -69,7 +69,7 @@ def study(
     asked = jobs.StudyRequest(threads=threads)
     with TemporaryDirectory(prefix="idbench-") as folder:
         store = _store(described, Path(folder) / described.name if out is None else Path(out))
-        with store.held(), pool_of(asked, store) as pool:
+        with store.held(), worker_pool(asked, store) as pool:
             if pool is not None:
                 run_missing(store, pool, min(LARGEST_SHARD, runs_of_shard(asked, store)), _unheard)
         return StudyTable.of(store)

@@ -44,7 +44,7 @@ TORQUE = Measure("torque_error_rms", "torque error on held-out logs, rms [N m, N
 POSITION = Measure("position_error", "position on held-out logs, from commands alone, mean absolute error [rad]", mean)
 
 
-def measure_of(row: Row) -> Measure:
+def row_measure(row: Row) -> Measure:
     """Return what a row is judged by."""
     return POSITION if any(POSITION.name in log for log in row["logs"]) else TORQUE
 
@@ -105,7 +105,7 @@ def _contained(logs: Sequence[Row]) -> str:
 
 def of_tools(row: Row) -> Iterator[list[str]]:
     """Yield the errors of each joint over all held-out logs, by each tool, with seconds."""
-    measure = measure_of(row)
+    measure = row_measure(row)
     for tool, logs, seconds in _tools(row):
         errors = pooled(logs, measure.name, measure.over_logs)
         yield [tool, *(f"{x:.3g}" if np.isfinite(x) else "" for x in errors), "" if seconds is None else f"{seconds:.2g}"]
@@ -123,7 +123,7 @@ def print_rows(console: Console, rows: Sequence[Row]) -> None:
 
 
 def _print_set(console: Console, row: Row) -> None:
-    console.print(Text(f"{row['title']}: {measure_of(row).words}", style="bold"), soft_wrap=True)
+    console.print(Text(f"{row['title']}: {row_measure(row).words}", style="bold"), soft_wrap=True)
     grid = new_table("", [*row["joints"], "seconds"])
     for cells in of_tools(row):
         grid.add_row(*cells)
@@ -208,11 +208,11 @@ def report(rows: Sequence[Row], failures: Mapping[str, str]) -> str:
         heads=[head.replace("\n", " ") for head in HEADS],
         overview=list(overview(rows)),
         failures=failures,
-        figure=svg(errors_figure(rows)) if any(measure_of(row) is TORQUE for row in rows) else "",
+        figure=svg(errors_figure(rows)) if any(row_measure(row) is TORQUE for row in rows) else "",
         sets=[
             {
                 "title": row["title"],
-                "measure": measure_of(row).words,
+                "measure": row_measure(row).words,
                 "joints": row["joints"],
                 "tools": list(of_tools(row)),
                 "remarks": list(remarks(row)),
@@ -224,7 +224,7 @@ def report(rows: Sequence[Row], failures: Mapping[str, str]) -> str:
 
 def errors_figure(rows: Sequence[Row]) -> Figure:
     """Return torque errors of every joint [% of its torque], a line a set that has torques, a colour a tool."""
-    rows = [row for row in rows if measure_of(row) is TORQUE]
+    rows = [row for row in rows if row_measure(row) is TORQUE]
     tools = list(dict.fromkeys(tool for row in rows for tool in shares(row)))
     figure = Figure(figsize=(8, 1.0 + 0.5 * len(rows)), layout="constrained")
     panel = figure.subplots()

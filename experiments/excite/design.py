@@ -19,7 +19,7 @@ from idbench.identify.design.information import predicted_information
 from idbench.identify.design.plan import Plan
 from idbench.identify.plugins import did_you_mean
 from idbench.sim.limits.clearance import Clearance
-from idbench.sim.limits.motion_limits import BOX, CLEARANCE, FLOOR, MotionLimits, home_of, limits_of, surroundings
+from idbench.sim.limits.motion_limits import BOX, CLEARANCE, FLOOR, MotionLimits, home_position, limits_of, surroundings
 from idbench.sim.scenario.scenario import Scenario
 from idbench.sim.trajectories.time_optimal import approach
 from idbench.sim.trajectories.trajectory import AbstractTrajectory, Reference
@@ -106,7 +106,7 @@ class Design:
     @cached_property
     def home(self) -> Array:
         """Where the arm comes from [rad], shape (joint,)."""
-        return home_of(self.robot_model.robot, self.asked, self.limits)
+        return home_position(self.robot_model.robot, self.asked, self.limits)
 
     @cached_property
     def clearance(self) -> Clearance:

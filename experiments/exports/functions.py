@@ -14,7 +14,7 @@ from idbench.identify.basis.block import RIGID
 from idbench.identify.basis.friction.shape import STEP, with_settings
 from idbench.identify.basis.loads import DriveGains, PayloadLink
 from idbench.identify.basis.newton_euler import link_torques
-from idbench.identify.basis.of_joints import inner_of
+from idbench.identify.basis.of_joints import block_of_all_joints
 from idbench.identify.basis.operations import recorded_state
 from idbench.identify.basis.symbols import SymbolArray, flat, inputs, solved
 from idbench.identify.basis.tape import Tape, Value
@@ -119,7 +119,7 @@ class RobotFunctions:
 
     def _unit_torques(self, block: AbstractBlock, state: State, load: Torques) -> Mapping[tuple[int, Parameter], Any]:
         """Return the columns of a block about its parameters, those of shapes left out."""
-        inner = inner_of(block)
+        inner = block_of_all_joints(block)
         if isinstance(inner, LoadFriction):
             return {(j, p): np.abs(load[j]) * np.sign(state.qd[..., j, :]) for j, p in self._by_joint(block)}
         if isinstance(inner, ShapedFriction):
@@ -177,7 +177,7 @@ class RobotFunctions:
         unloaded = replace(self._state, s=lambda _: SymbolArray(np.zeros((n, 1))))  # type: ignore[arg-type,return-value]
         left = [tau[j] - x for j, x in enumerate(self._resisting(unloaded, [0.0] * n))]
         for block in self._others:
-            if isinstance(inner_of(block), LoadFriction):
+            if isinstance(block_of_all_joints(block), LoadFriction):
                 for j, p in self._by_joint(block):
                     share = self._values.get(p, 0.0) * np.sign(self._state.qd[..., j, :])
                     left[j] = left[j] / (1.0 + share * np.sign(left[j]))
@@ -202,7 +202,7 @@ class RobotFunctions:
     def slopes(self, block: AbstractBlock, state: State) -> dict[tuple[int, Parameter], Any]:
         """Return the columns of a block that is nonlinear: slopes at the parameters, as the identification takes them."""
         found = dict(self._unit_torques(block, state, self._load))
-        inner = inner_of(block)
+        inner = block_of_all_joints(block)
         if isinstance(inner, ShapedFriction):
             for shape in inner.shapes:
                 ahead, behind = (self._shaped(inner, state, h, shape.setting) for h in (STEP, -STEP))
@@ -279,7 +279,7 @@ def require_formulas(basis: Basis, tree: KinematicTree, target: object) -> Robot
     """Return the functions of a robot; ExperimentError if a part of it cannot be written as formulas."""
     made = RobotFunctions(basis, tree)
     for block in basis.blocks:
-        inner = inner_of(block)
+        inner = block_of_all_joints(block)
         if isinstance(inner, DriveGains | PayloadLink):
             raise ExperimentError(f"{target}: gains of drives and payloads are no part of the robot: write it without them")
         if block.is_nonlinear and not isinstance(inner, LoadFriction | ShapedFriction):

@@ -9,7 +9,7 @@ import numpy as np
 
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.chain_settings import with_cutoff
-from idbench.experiments.identification.logs import Logs, sought_of
+from idbench.experiments.identification.logs import Logs, delay_method
 from idbench.experiments.identification.poses import of_poses
 from idbench.experiments.identification.reading import ReadLog, ReadOptions, file_of, late, read, read_as, with_delays
 from idbench.experiments.identification.request import Request
@@ -74,7 +74,7 @@ def load(paths: Sequence[Path], options: ReadOptions, request: Request, *, band:
     require_different(paths)
     with stage("reading logs"):
         every = [read(file_of(path), options, request.robot_model) for path in paths]
-    return prepared(every, request, sought=sought_of(options.delay), band=band, more=more)
+    return prepared(every, request, sought=delay_method(options.delay), band=band, more=more)
 
 
 def prepared(every: Sequence[ReadLog], request: Request, *, sought: str | None, band: bool, more: int = 0) -> Loaded:
@@ -113,7 +113,7 @@ def with_held_out(loaded: Loaded, paths: Sequence[Path], options: ReadOptions, t
     Where nothing says what the torques of these mean, it is what those of the first log do.
     """
     known = loaded.read[0].channel  # as it was logged; its gain is of its own file
-    sought, every = sought_of(options.delay), dict[str, ReadLog]()
+    sought, every = delay_method(options.delay), dict[str, ReadLog]()
     options = replace(options, fallback=replace(known, gain=1.0))
     require_different(paths)
     for given in paths:

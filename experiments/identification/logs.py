@@ -106,7 +106,7 @@ DELAYS: Mapping[str, Callable[[Sequence[MotionLog], Basis, Chain], DelayEstimate
 """Words for a delay that the logs are asked for, and who asks them: one of all joints, or one of each."""
 
 
-def sought_of(delay: str | None) -> str | None:
+def delay_method(delay: str | None) -> str | None:
     """Return which delay is to be found, of `DELAYS`, if one is."""
     return delay if delay in DELAYS else None
 

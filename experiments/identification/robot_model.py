@@ -183,7 +183,7 @@ class RobotModel:
                 raise ExperimentError(f"--tie {word}: write NAME=NAME, each name on the left once, as in Ia1=Ia4")
             ties[name] = other
         try:
-            return basis.tying(**ties) if ties else basis
+            return basis.with_ties(**ties) if ties else basis
         except SettingError as error:
             raise ExperimentError(f"--tie: {error}") from error
 

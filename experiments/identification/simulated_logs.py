@@ -16,7 +16,7 @@ from idbench.experiments.identification.robot_model import RobotModel
 from idbench.identify import Array, CentralDifference, ExplicitModel, IdentificationError, MotionLog, Problem
 from idbench.identify.rows.rows import is_long
 from idbench.identify.signals.filters import REACH, shift
-from idbench.sim.robot.time_steps import integrator_name, seeming_inertia, torque_of_steps
+from idbench.sim.robot.time_steps import apparent_rotor_inertia, integrator_name, torque_of_steps
 
 EVIDENT, HALF = 0.1, 0.5
 """Shares of what the file's own parameters leave of the torques that they leave without the integrator's part, in a quarter and
@@ -42,7 +42,7 @@ class SimulatedLogs:
     def of(cls, every: Sequence[ReadLog], request: Request) -> "SimulatedLogs | None":
         """Return how the torques of logs are read, if that is stated or evident; None if they are no simulation's."""
         robot_model, stated = request.robot_model, any(read.simulated for read in every)
-        inertia = seeming_inertia(robot_model.robot)
+        inertia = apparent_rotor_inertia(robot_model.robot)
         found = cls(robot_model, inertia)
         if stated:
             if Path(robot_model.name).suffix not in ("", ".xml"):

@@ -10,7 +10,7 @@ from idbench.experiments.identification.robot_model import RobotModel
 from idbench.identify import MotionLog, brisk_shares, showing_moves
 from idbench.identify.basis.block import NOT_NEGATIVE, named
 from idbench.sim.robot.robot import Robot
-from idbench.sim.robot.time_steps import seeming_inertia
+from idbench.sim.robot.time_steps import apparent_rotor_inertia
 from idbench.sim.robot.tree import kinematic_tree, unmodelled
 
 WELL_EXPLAINED = 0.95
@@ -65,14 +65,14 @@ def warnings_of_result(fit: Fit) -> dict[str, list[str]]:
     motion += little
     model += [] if little else list(_badly_explained(fit, name))
     if not (log or motion or model):
-        motion = _left_open(fit)
+        motion = _poorly_known(fit)
     return {LOG: log, MOTION: motion, MODEL: model}
 
 
 def _seems_simulated(fit: Fit) -> Iterator[str]:
     """Yield whether rotors are larger than the file's by what MuJoCo's integrator makes of the file's own damping."""
     robot, estimate = fit.robot_model.robot, fit.estimates[fit.leading]
-    inertia = seeming_inertia(robot)
+    inertia = apparent_rotor_inertia(robot)
     found = dict(zip(estimate.names, estimate.X, strict=True))
     own = [j for j in range(robot.n) if inertia[j] > 0 and named("Ia", j) in found]
     more = [(found[named("Ia", j)] - robot.model.dof_armature[j]) / inertia[j] for j in own]
@@ -229,7 +229,7 @@ def _work(log: MotionLog) -> float:
     return float(np.sum((tau[1:] + tau[:-1]) / 2 * np.diff(log.q, axis=0)))
 
 
-def _left_open(fit: Fit) -> list[str]:
+def _poorly_known(fit: Fit) -> list[str]:
     """Return which base parameters the log leaves open so far that a brisk motion shows it, and the moves to make.
 
     By the part of sigma due to noise: another motion does not mend the model.

@@ -16,7 +16,7 @@ from idbench.experiments.identification.load import in_band, load
 from idbench.experiments.identification.reading import file_of
 from idbench.experiments.identification.request import Request
 from idbench.experiments.identification.robot_model import RobotModel, absolute
-from idbench.experiments.loads.known_load import LoadJudgement, known_of
+from idbench.experiments.loads.known_load import LoadJudgement, payload_parameters
 from idbench.experiments.loads.loads_text import gains_summary, payload_summary, print_gains, print_payloads
 from idbench.experiments.loads.simulated import Pairs
 from idbench.experiments.requests.jobs import GainsRequest, LoadRequest, PayloadRequest
@@ -167,7 +167,7 @@ def _loaded(asked: LoadRequest) -> tuple[LoadJudgement, tuple[str, ...]]:
         raise ExperimentError("name the logs with the payload, or --simulate SCENARIO")
     if asked.robot is None:
         raise ExperimentError("--robot is missing: the file that describes the arm, or the name of one that ships")
-    known = known_of(asked.known.mass, asked.known.at, asked.known.inertia)
+    known = payload_parameters(asked.known.mass, asked.known.at, asked.known.inertia)
     robot_model = RobotModel(absolute(asked.robot), asked.parameters, asked.mounting.mounting)
     request = Request(robot_model, models=("explicit",), estimator=asked.estimator, mask_speed=asked.mask_speed)
     if asked.cutoff is not None:

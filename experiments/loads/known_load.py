@@ -32,7 +32,7 @@ ROUNDING = 1e-9
 """Share of the moments of inertia that is rounding of a drawing."""
 
 
-def known_of(mass: float | None, at: Sequence[float] | None, inertia: Sequence[float] | None) -> dict[str, float]:
+def payload_parameters(mass: float | None, at: Sequence[float] | None, inertia: Sequence[float] | None) -> dict[str, float]:
     """Return the parameters of a payload that follow from its mass, centre of mass and inertia about that.
 
     Raises

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from idbench.experiments.errors import ExperimentError
-from idbench.experiments.recording.viewers import answers, reachable, served, spawned
+from idbench.experiments.recording.viewers import answers, reachable, served, start_viewer
 from idbench.experiments.requests.words import Count, Real, Url
 
 if TYPE_CHECKING:
@@ -76,7 +76,7 @@ class Watching:
         if self.connect:
             yield Audience(reachable(self.connect), self.pace)
         elif self.live:
-            yield Audience(spawned(), self.pace)
+            yield Audience(start_viewer(), self.pace)
         elif self.serve:
             with served(PORT if self.port is None else self.port) as url:
                 yield Audience(url, self.pace)

@@ -13,7 +13,14 @@ from idbench.experiments.recording.chart import NARROW, SQUARE, SYMBOLS, Chart
 from idbench.experiments.recording.columns import part
 from idbench.experiments.recording.scales import Linear, Signed, Words, decades, linear, listed
 from idbench.experiments.recording.stream import Stream
-from idbench.experiments.reports.friction_curves import FRICTIONS, FrictionCurves, Spectrum, left_over, of_joints, spectra
+from idbench.experiments.reports.friction_curves import (
+    FRICTIONS,
+    FrictionCurves,
+    Spectrum,
+    of_joints,
+    residual_instants,
+    spectra,
+)
 from idbench.experiments.text import GREY, JOINTS, SIGMAS, Color, model_color
 from idbench.identify import Array, Estimate, Instants, binned, cutoffs
 
@@ -147,7 +154,7 @@ class ResidualCharts:
 
     def send(self) -> None:
         """Send them all."""
-        left = left_over(self.fit)
+        left = residual_instants(self.fit)
         joined = of_joints(self.fit, left)
         for j in range(len(self.joints)) if joined else ():
             self._over("over_velocity", j, joined)

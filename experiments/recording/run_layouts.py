@@ -51,8 +51,8 @@ def overview(shelf: Shelf) -> Part:
         shares=[1, 1, 1, 1, 1, LANES[0] + LANES[1] * len(shelf.joints)],
     )
     left = column(arm(shelf), text(shelf, "identify/*/estimates") or text(shelf, "about"), shares=[5, 4])
-    fits, left_over = column(*_fits(shelf, rows)), column(*residuals(shelf))
-    return side_by_side("overview", left, motion, fits, left_over, shares=[6, 7, 5, 6])
+    fits, residual_instants = column(*_fits(shelf, rows)), column(*residuals(shelf))
+    return side_by_side("overview", left, motion, fits, residual_instants, shares=[6, 7, 5, 6])
 
 
 def torques(shelf: Shelf) -> Part:

@@ -64,7 +64,7 @@ def require_display() -> None:
         raise ExperimentError("there is no display here: use --serve and a browser, or --connect URL to a viewer elsewhere")
 
 
-def spawned() -> str:
+def start_viewer() -> str:
     """Start a viewer that outlives the command; return where it listens."""
     require_display()
     with closing(socket.socket()) as probe:

@@ -114,7 +114,7 @@ SAME = 0.99
 """Errors in multiples of an earlier model's from which on a later one is no better."""
 
 
-def shown_whole(fit: Fit, asked: bool) -> tuple[str, ...]:
+def models_in_full(fit: Fit, asked: bool) -> tuple[str, ...]:
     """Return the models whose tables are shown whole: all if they were asked for, else the first."""
     return tuple(fit.estimates) if asked else tuple(fit.estimates)[:1]
 

@@ -10,7 +10,7 @@ from jinja2 import Environment
 from idbench.experiments.identification.causes import Cause
 from idbench.experiments.identification.fit import Fit
 from idbench.experiments.judgement.held_out import HeldOut
-from idbench.experiments.reports.friction_curves import FRICTIONS, WHOLE, FrictionCurves, left_over, spectra
+from idbench.experiments.reports.friction_curves import FRICTIONS, WHOLE, FrictionCurves, residual_instants, spectra
 from idbench.experiments.reports.panels import Panel, PanelAxis, figure
 from idbench.experiments.text import model_color, percentage
 from idbench.identify import Array, cutoffs
@@ -113,7 +113,9 @@ def friction_figure(fit: Fit) -> str:
 def spectra_figure(fit: Fit) -> str:
     """Return spectra of what the first model leaves, and of the noise that was found, joint by joint; of the first log."""
     form = next(iter(fit.estimates))
-    every = [found for found in spectra(fit, {form: left_over(fit)[form]}) if found.lines[form].max()]  # of joints that move
+    every = [
+        found for found in spectra(fit, {form: residual_instants(fit)[form]}) if found.lines[form].max()
+    ]  # of joints that move
     panels = list[Panel]()
     for found in every:
         top = float(found.lines[form].max())

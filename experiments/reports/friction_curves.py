@@ -11,7 +11,7 @@ from idbench.identify import MODELS, AbstractBlock, Array, Basis, Chain, Instant
 from idbench.identify.arrays import combined
 from idbench.identify.basis import LoadFriction
 from idbench.identify.basis.joint_law import AbstractFriction
-from idbench.identify.basis.of_joints import inner_of
+from idbench.identify.basis.of_joints import block_of_all_joints
 from idbench.identify.judge.residuals import filtered
 from idbench.identify.rows.row_map import Kernel
 from idbench.identify.signals.signals import Signals, State
@@ -36,7 +36,7 @@ class Spectrum:
     """Of what each model leaves, and of the noise of torques and of positions, shape (frequency,) each."""
 
 
-def left_over(fit: Fit) -> dict[str, Instants]:
+def residual_instants(fit: Fit) -> dict[str, Instants]:
     """Return the residuals of each model's equations, at every sample of the first log."""
     signals = fit.problem.signals[0]
     basis = fit.basis
@@ -161,7 +161,9 @@ class FrictionCurves:
 
     def _loads(self, j: int) -> list[float]:
         """Return the loads at which a law of a joint is drawn: one, if it depends on none."""
-        own = [inner_of(block) for block in self._laws[0].blocks if not isinstance(block, OfJoints) or j in block.joints]
+        own = [
+            block_of_all_joints(block) for block in self._laws[0].blocks if not isinstance(block, OfJoints) or j in block.joints
+        ]
         law = next((block for block in own if isinstance(block, LoadFriction)), None)
         if law is None:
             return [0.0]
@@ -191,7 +193,7 @@ class _Loaded(AbstractFriction):
 
 def _loaded(block: AbstractBlock, load: float) -> AbstractBlock:
     """Return a block whose load is a given one."""
-    made = _Loaded(load) if isinstance(inner_of(block), LoadFriction) else inner_of(block)
+    made = _Loaded(load) if isinstance(block_of_all_joints(block), LoadFriction) else block_of_all_joints(block)
     return replace(block, block=made) if isinstance(block, OfJoints) else made
 
 

@@ -15,7 +15,7 @@ from idbench.experiments.identification.fit import Fit
 from idbench.experiments.identification.iterations import words_of_iterations
 from idbench.experiments.judgement.held_out import HeldOut
 from idbench.experiments.judgement.judgement import Unjudged
-from idbench.experiments.judgement.remedies import SURE
+from idbench.experiments.judgement.remedies import NEGLIGIBLE, SURE
 from idbench.experiments.reports.estimates import EstimatesTable, differing, explained, leading
 from idbench.experiments.reports.uncertainty import words_of_uncertainty
 from idbench.experiments.text import new_table, percentage, print_titled
@@ -116,7 +116,8 @@ def _told(fit: Fit) -> Iterator[str]:
     if not fit.logs.fitted[0].poses:
         sure = np.atleast_1d(channel.delay_sigma)
         how_sure = f", estimated from the log, sigma {', '.join(f'{1e3 * x:.2g}' for x in sure)} ms" if sure.any() else ""
-        early = f" (it is logged {1e3 * -channel.delay:.4g} ms after it acts)" if channel.delay < 0 and not channel.lags else ""
+        is_early = channel.delay < -NEGLIGIBLE / fit.logs.fitted[0].fs and not channel.lags
+        early = f" (it is logged {1e3 * -channel.delay:.4g} ms after it acts)" if is_early else ""
         yield f"torque: {channel.meaning}, delay {channel.late}{early}{how_sure}{ignored if logged else ''}"
     if fit.delay is not None:
         delay, sigma = (1e3 * x for x in fit.delay)

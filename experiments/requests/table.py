@@ -21,13 +21,13 @@ Place = tuple[str, ...]
 """Where a key is: the names of the group and the field."""
 
 
-def keys_of(request: Any) -> dict[str, tuple[Place, Any]]:
+def request_keys(request: Any) -> dict[str, tuple[Place, Any]]:
     """Return the keys of a request, those of its groups among them: where each is, and its type."""
     found = dict[str, tuple[Place, Any]]()
     for name, hint in get_type_hints(request, include_extras=True).items():
         inner = get_args(hint)[0] if get_origin(hint) is Annotated else hint
         if hasattr(inner, "__dataclass_fields__"):
-            found |= {key: ((name, *place), type_) for key, (place, type_) in keys_of(inner).items()}
+            found |= {key: ((name, *place), type_) for key, (place, type_) in request_keys(inner).items()}
         elif name in request.__dataclass_fields__:
             found[name] = (name,), hint
     return found
@@ -56,7 +56,7 @@ def request_from(
     ExperimentError
         If a key is unknown, or a value not of its type: it names the value and what is allowed.
     """
-    known = {key: place for key, place in keys_of(request).items() if key not in taken}
+    known = {key: place for key, place in request_keys(request).items() if key not in taken}
     values, groups = dict[str, Any](), dict[str, dict[str, Any]]()
     for key, value in table.items():
         if key not in known:
@@ -81,7 +81,7 @@ def files_named(request: Any, folder: Path = Path()) -> tuple[Path, ...]:
 
 def as_table(request: Any, words: str, taken: Container[str] = ()) -> str:
     """Return options of a command line as keys in one line of TOML; nothing that they name is loaded."""
-    known = keys_of(request)
+    known = request_keys(request)
     found = dict[str, Any]()
     key = ""
     for word in shlex.split(words):
@@ -147,7 +147,7 @@ def _names_file(hint: Any) -> bool:
 
 def _named(request: Any) -> Iterator[Path]:
     """Yield the files that a request names."""
-    for place, hint in keys_of(type(request)).values():
+    for place, hint in request_keys(type(request)).values():
         value = request
         for name in place:
             value = getattr(value, name)

@@ -18,7 +18,7 @@ from idbench.identify import Array, MotionLog, TorqueChannel
 from idbench.identify.files.servo_file import ServoFile
 from idbench.identify.files.servo_log import ServoColumns
 from idbench.identify.servo import Servo, ServoFit, ServoRun, identify_servo
-from idbench.identify.servo.choice import choose_friction, lacks_of
+from idbench.identify.servo.choice import choose_friction, residuals_by_state
 from idbench.identify.servo.fit import TORQUES
 from idbench.identify.servo.law import EXACT, KINDS
 from idbench.identify.servo.mistakes import MISTAKES, ServoMistake
@@ -230,4 +230,4 @@ def mistake_summary(joint: str, mistake: ServoMistake) -> dict[str, Any]:
 
 def lacks_summary(fit: ServoFit) -> dict[str, Any]:
     """Return what a summary says of what a fit lacks."""
-    return {"friction": fit.friction, "residuals": [lack._asdict() for lack in lacks_of(fit)]}
+    return {"friction": fit.friction, "residuals": [lack._asdict() for lack in residuals_by_state(fit)]}

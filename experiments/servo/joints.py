@@ -13,7 +13,7 @@ from idbench.identify.files.servo_log import ServoColumns
 from idbench.identify.servo import JointLoad, Servo, ServoFit, ServoRun, identify_again
 from idbench.identify.servo.choice import ServoFrictionChoice
 from idbench.identify.servo.identification import APART, OffsetJoint, per_offset, together
-from idbench.identify.servo.stages import looked_at
+from idbench.identify.servo.stages import searched_runs
 from idbench.identify.servo.tied import tied
 from idbench.identify.telling import stage
 from idbench.sim.robot.robot import Robot
@@ -150,7 +150,7 @@ class Joints:
             for j, (fit, changes) in joints.items():
                 if j != k:
                     late = before[j].p["delay"]
-                    changes[k] = per_offset(fit, looked_at(now[j], late), looked_at(runs[j], late))
+                    changes[k] = per_offset(fit, searched_runs(now[j], late), searched_runs(runs[j], late))
         return together(joints, assumed)
 
     def _first(self, identify: Identify, j: int, runs: Sequence[ServoRun]) -> tuple[Identified | str, ServoFit | None]:

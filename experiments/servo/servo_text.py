@@ -12,7 +12,7 @@ from idbench.experiments.text import error_percentage, new_table, number, print_
 from idbench.identify import Array
 from idbench.identify.arrays import TINY
 from idbench.identify.servo import ServoFit
-from idbench.identify.servo.choice import ServoFrictionChoice, lacks_of
+from idbench.identify.servo.choice import ServoFrictionChoice, residuals_by_state
 from idbench.identify.servo.fit import TORQUES
 from idbench.identify.servo.mistakes import EXPLAINED, REMAINING, ServoMistake
 from idbench.identify.servo.parameters import SERVO_PARAMETERS
@@ -192,7 +192,7 @@ def _holds(fit: ServoFit, fitted: Array, held_out: Array | None, moved: float, m
 
 
 def _lacks(fit: ServoFit) -> str:
-    lacks, step = lacks_of(fit), fit.loop.step
+    lacks, step = residuals_by_state(fit), fit.loop.step
     if lacks[0].error <= EXPLAINED * step / 4:  # what rounding leaves, on average
         return "its residuals are little more than the rounding of the encoder"
     in_counts = step > 0 and lacks[0].error < step / COUNTS

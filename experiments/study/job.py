@@ -46,7 +46,7 @@ def runs_of_shard(asked: StudyRequest, store: Store) -> int:
     return asked.shard or min(LARGEST_SHARD, ceil(store.study.size / (2 * width_of(asked))))
 
 
-def pool_of(asked: StudyRequest, store: Store) -> AbstractContextManager[Any]:
+def worker_pool(asked: StudyRequest, store: Store) -> AbstractContextManager[Any]:
     """Return where shards are computed; nowhere, if nothing is missing."""
     from idbench.experiments.study.cluster import cluster_pool
 

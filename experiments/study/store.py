@@ -60,7 +60,7 @@ def runs_of(path: Path) -> range:
 
 def require_of(path: Path, study: Study) -> None:
     """Raise StudyError unless a shard is of this study as it is now, made by the same versions, and whole."""
-    metadata = said_by(path)
+    metadata = shard_header(path)
     if metadata.get("fingerprint") != study.fingerprint:
         raise StudyError(f"study.toml was changed since {path.name} was made: undo the change, or begin anew in another --out")
     require_versions(json.loads(metadata["versions"]), f"the maker of {path.name}")
@@ -69,7 +69,7 @@ def require_of(path: Path, study: Study) -> None:
         raise StudyError(f"{path} has {rows} rows, its name and the study say {expected}: remove it, and go on with --resume")
 
 
-def said_by(path: Path) -> dict[str, str]:
+def shard_header(path: Path) -> dict[str, str]:
     """Return what a shard says of itself; raise StudyError if it is damaged."""
     try:
         metadata = pq.read_schema(path).metadata or {}
@@ -216,7 +216,7 @@ class Store:
         """Return how long simulation and each method took, summed over the finished shards [s]."""
         total: dict[str, float] = {}
         for path in self.shards():
-            for what, seconds in json.loads(said_by(path)["seconds"]).items():
+            for what, seconds in json.loads(shard_header(path)["seconds"]).items():
                 total[what] = total.get(what, 0.0) + seconds
         return total
 

@@ -58,7 +58,7 @@ def report(study: Study, cells: Sequence[Cell], seconds: dict[str, float], folde
         study=study,
         methods=len(study.methods),
         headline="" if _compares(study) or not solved else headline(solved, study.edges),
-        answer=said_of(study, cells),
+        answer=study_answer(study, cells),
         typical=typical_figure(dict(families(study, solved)), main_axis(study), study.edges) if solved else "",
         axes=[short(name) for name in cells[0].settings],
         overview=[_overview(cell) for cell in cells],
@@ -79,7 +79,7 @@ def report(study: Study, cells: Sequence[Cell], seconds: dict[str, float], folde
     )
 
 
-def said_of(study: Study, found: Sequence[Cell]) -> str:
+def study_answer(study: Study, found: Sequence[Cell]) -> str:
     """Return the answer of a study: the ratios of the models' errors, or which method errs least."""
     if not (_compares(study) and any(cell.runs for cell in found)):
         return answer(found, study.edges)
@@ -226,7 +226,7 @@ def print_study(page: Console, study: Study, found: Sequence[Cell]) -> None:
     print_table(page, grid, len(axes) + 1)
     if study.rows == "equal" and (pairs := list(ratios(found))):
         print_table(page, ratios_table(pairs), 3)
-    page.print(Text(said_of(study, found)))
+    page.print(Text(study_answer(study, found)))
     for reason in _reasons(found)[:MOST_REASONS]:
         page.print(Text(f"failed: {reason}"), soft_wrap=True)
 
@@ -257,7 +257,7 @@ def summary_of(study: Study, found: Sequence[Cell], seconds: dict[str, float]) -
         "seed": study.seed,
         "study": study.content,
         "scenario": study.scenario,
-        "answer": said_of(study, found),
+        "answer": study_answer(study, found),
         "parameters": list(study.parameters),
         "cells": [_cell(cell) for cell in found],
         **({"ratios": ratios_summary(list(ratios(found)))} if study.rows == "equal" else {}),

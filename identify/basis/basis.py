@@ -112,7 +112,7 @@ class Basis:
         held = {p: value / p.scale for p, value in zip(self.named(*values), values.values(), strict=True)}
         return replace(self, held={**self.held, **held}).without(*values)
 
-    def tying(self, **names: str) -> Self:
+    def with_ties(self, **names: str) -> Self:
         """Return the basis with parameters, by name, that equal others.
 
         Raises

@@ -68,7 +68,7 @@ class OfJoints(AbstractBlock):
         return {address: column for address, column in columns.items() if address[1].joint in self.joints}
 
 
-def inner_of(block: AbstractBlock) -> AbstractBlock:
+def block_of_all_joints(block: AbstractBlock) -> AbstractBlock:
     """Return a block as it is of all joints."""
     return block.block if isinstance(block, OfJoints) else block
 

@@ -144,7 +144,7 @@ def on_tree(basis: Basis, tree: KinematicTree) -> Basis:
     return replace(basis, blocks=blocks)
 
 
-def carrying(basis: Basis) -> Basis:
+def with_first_link_moments(basis: Basis) -> Basis:
     """Return a basis with what gravity across the axis of the first joint makes of its link: its own first moments."""
     there = {(p.kind, p.joint) for p in basis.parameters}
     one_wave = OfJoints(Cogging(1.0), (0,))

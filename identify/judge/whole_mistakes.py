@@ -11,7 +11,7 @@ import numpy.typing as npt
 from idbench.identify.arrays import Array
 from idbench.identify.basis.basis import Basis
 from idbench.identify.estimators.problem import Problem
-from idbench.identify.judge.fitted_motion import carrying, on_tree, tree_of
+from idbench.identify.judge.fitted_motion import on_tree, tree_of, with_first_link_moments
 from idbench.identify.judge.stretches import held_out_errors
 from idbench.identify.judge.suspect import Suspect
 from idbench.identify.minimum import minimum
@@ -188,7 +188,8 @@ def _across(problem: Problem) -> Iterator[_Tried]:
         return
     g, there = float(np.linalg.norm(tree.gravity)) or GRAVITY, bool(np.any(tree.gravity))
     axes = np.linalg.svd(tree.gravity[None])[2][1:] if there else np.eye(3)
-    basis = carrying(problem.basis) if there and problem.prior is None else problem.basis  # which has rows of its own
+    free = there and problem.prior is None  # a prior has rows of its own
+    basis = with_first_link_moments(problem.basis) if free else problem.basis
     yield from (_with_gravity(problem, basis, sign * g * a) for a in axes for sign in (1, -1))
 
 

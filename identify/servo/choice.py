@@ -33,7 +33,7 @@ class ServoLack(NamedTuple):
     """Mean absolute residual [rad]."""
 
 
-def lacks_of(fit: ServoFit) -> list[ServoLack]:
+def residuals_by_state(fit: ServoFit) -> list[ServoLack]:
     """Return residuals by what the joint is doing, the largest first."""
     loop = fit.loop
     speed = np.stack([_spread(np.abs(np.gradient(run.clean, run.t)), loop.samples) for run in loop.runs])

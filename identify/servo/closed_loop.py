@@ -62,7 +62,7 @@ class ServoLoop:
         self.q = np.stack([_padded(run.clean, self.samples) for run in self.runs])
         self.kept = np.stack([_padded(run.read_well, self.samples, False) for run in self.runs])
         self.step = max(run.step for run in self.runs)
-        self._begin = [begin_of(run) for run in self.runs]
+        self._begin = [initial_state(run) for run in self.runs]
         commands = np.concatenate([run.command for run in self.runs])
         self._fastest = WAY * (float(np.ptp(self.q[self.kept])) + float(np.ptp(commands)) + 1e-6) / self.h
         self._tracks = [self._track(run) for run in self.runs]
@@ -146,7 +146,7 @@ def _centred(x: Array) -> Array:
     return np.concatenate([x[:1], (x[1:] + x[:-1]) / 2])
 
 
-def begin_of(run: ServoRun) -> Begin:
+def initial_state(run: ServoRun) -> Begin:
     """Return how a run begins, from its first samples; it is at rest if they differ by two counts at most."""
     if run.step:
         t, q = run.t[:7] - run.t[0], run.clean[:7]

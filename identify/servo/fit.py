@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from idbench.identify.arrays import Array
 from idbench.identify.errors import SettingError
-from idbench.identify.servo.closed_loop import STATES, ServoLoop, begin_of
+from idbench.identify.servo.closed_loop import STATES, ServoLoop, initial_state
 from idbench.identify.servo.excitation import Excitation
 from idbench.identify.servo.law import Servo
 from idbench.identify.servo.left_out import LeftOut, left_out, stretches
@@ -157,7 +157,7 @@ class ServoFit:
         """
         loop = ServoLoop(runs, self.loop.h)
         ahead = np.zeros((len(runs), STATES))
-        for other, run, begin in zip(ahead, runs, map(begin_of, runs), strict=True):
+        for other, run, begin in zip(ahead, runs, map(initial_state, runs), strict=True):
             if begin.per_angle[-1] > 0:
                 other[1:] = run.still, (begin.state[0] - run.command[0]) / begin.per_angle[-1]
         apart = np.abs(loop.simulate(self.p)[0] - loop.simulate(self.p, ahead)[0])

@@ -7,7 +7,7 @@ from typing import final
 import numpy as np
 from scipy.stats import wilcoxon
 
-from idbench.identify.servo.choice import LEVEL, lacks_of
+from idbench.identify.servo.choice import LEVEL, residuals_by_state
 from idbench.identify.servo.fit import CLUSTERS, ServoFit
 from idbench.identify.servo.left_out import left_out, stretches
 from idbench.identify.servo.parameters import SERVO_PARAMETERS
@@ -73,7 +73,7 @@ def mistake_of(fit: ServoFit) -> ServoMistake | None:
     Each is searched for from where the fit is, in coarse steps. The best is fitted with all other parameters, and proved if
     parts of the log that a fit did not use are then predicted better, by Wilcoxon's signed-rank test.
     """
-    if lacks_of(fit)[0].error <= EXPLAINED * fit.loop.step / 4:
+    if residuals_by_state(fit)[0].error <= EXPLAINED * fit.loop.step / 4:
         return None
     tried = [name for name in MISTAKES if name not in fit.free and not fit.p.get(name) and (name != "Fo" or fit.excitation.off)]
     known = {name: x for name, x in fit.p.items() if name not in fit.free and name not in tried}

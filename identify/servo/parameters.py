@@ -38,7 +38,7 @@ def simpler(law: str) -> list[str]:
     return [] if inner is None else [*simpler(inner), inner]
 
 
-def first_of(law: str, p: Mapping[str, float], speed: float) -> dict[str, float]:
+def start_parameters(law: str, p: Mapping[str, float], speed: float) -> dict[str, float]:
     """Return where the parameters of a law begin, with those of the simpler law and a typical speed [rad/s]."""
     load = p.get("Fl", 0.1)
     first = {"Fst": 0.3 * p["Fs"], "vs": 0.1 * speed, "Fl": 0.05, "Fls": 0.3 * load, "Fle": load, "Flm": load, "Flq": 0.0}

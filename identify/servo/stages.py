@@ -10,7 +10,7 @@ from idbench.identify.errors import ExcitationError, IdentificationError
 from idbench.identify.servo.closed_loop import ServoLoop, count_of
 from idbench.identify.servo.excitation import Excitation
 from idbench.identify.servo.fit import ServoFit, require_possible
-from idbench.identify.servo.parameters import FURTHER, SERVO_FRICTIONS, SERVO_PARAMETERS, first_of, parameters_of
+from idbench.identify.servo.parameters import FURTHER, SERVO_FRICTIONS, SERVO_PARAMETERS, parameters_of, start_parameters
 from idbench.identify.servo.rows import ServoRows
 from idbench.identify.servo.run import ServoRun, pieces
 from idbench.identify.servo.search import Found, ServoSearch
@@ -63,7 +63,7 @@ class Stages:
         self._excitation = Excitation.of(runs, held)
         self.held = held if self._excitation.loaded else {"a": 1.0} | held
         self.start, self._few = dict(start), len(_evenly(runs)) <= FEW or not cut
-        self._whole = looked_at(runs, self.start["delay"]) if cut else list(runs)
+        self._whole = searched_runs(runs, self.start["delay"]) if cut else list(runs)
         self._simulated = self._whole[0].servo.steps.step  # of a simulation, whose steps are then ours
         coarse = self._simulated or max(COARSE * self._excitation.T, 2 * STEP)
         self._coarse = ServoLoop(self._whole if self._few else self._whole[::2], coarse)
@@ -83,7 +83,7 @@ class Stages:
     def go(self, friction: str, more: Sequence[str], p: Mapping[str, float]) -> dict[str, float]:
         """Return the parameters with a law of friction and further ones, from those of a simpler law."""
         more = (*more, *self._usual)
-        first = first_of(friction, p, self._excitation.speed) | dict.fromkeys(more, 0.0)
+        first = start_parameters(friction, p, self._excitation.speed) | dict.fromkeys(more, 0.0)
         begin = {**first, **p, **self.held}
         if "backlash" in more and "backlash" not in {**p, **self.held}:
             begin["backlash"] = _play(self._coarse, begin)
@@ -142,7 +142,7 @@ class Stages:
         return tuple(name for name in SERVO_PARAMETERS if name in names - set(self.held))
 
 
-def looked_at(runs: Sequence[ServoRun], delay: float) -> list[ServoRun]:
+def searched_runs(runs: Sequence[ServoRun], delay: float) -> list[ServoRun]:
     """Return runs, or their pieces, that a search looks at, commands being as late as its start says [s]."""
     whole = _evenly(runs)
     return whole if len(whole) > FEW else [piece for run in whole for piece in pieces(run, 1.5 * max(delay, 0.0))]

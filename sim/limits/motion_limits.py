@@ -136,7 +136,7 @@ def limits_of(robot: Robot, asked: MotionLimits) -> Limits:
     return Limits(position, velocity, acceleration, jerk, torque, rms)
 
 
-def home_of(robot: Robot, asked: MotionLimits, limits: Limits) -> Array:
+def home_position(robot: Robot, asked: MotionLimits, limits: Limits) -> Array:
     """Return where the arm comes from [rad], shape (joint,): as asked, the keyframe `home`, or where the file puts it.
 
     Raises

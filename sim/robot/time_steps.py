@@ -13,7 +13,7 @@ VELOCITY = 2
 """Place of what multiplies the velocity among the numbers of an actuator's bias: -kv of `position`."""
 
 
-def seeming_inertia(robot: Robot) -> Array:
+def apparent_rotor_inertia(robot: Robot) -> Array:
     """Return by how much rotors seem larger in torques that the robot's own actuators made, shape (joint,) [kg m^2, kg].
 
     h (kv + D / 2) by the implicit integrators, h D / 2 by Euler's, and -h D / 2 where `eulerdamp` is disabled: see

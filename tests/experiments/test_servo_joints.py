@@ -13,7 +13,7 @@ from idbench.identify import IdentificationError
 from idbench.identify.files.servo_log import ServoColumns
 from idbench.identify.servo import Servo, identify_again, identify_servo
 from idbench.identify.servo.identification import APART, per_offset
-from idbench.identify.servo.stages import looked_at
+from idbench.identify.servo.stages import searched_runs
 from idbench.sim.engine.simulation import simulate
 from idbench.sim.robot.mounting import PLAIN
 from idbench.sim.robot.servos import links
@@ -133,5 +133,5 @@ def test_offsets_are_what_gravity_says_of_all_joints_and_their_changes_what_anot
     shifted = joints.runs_with(
         {**alone, 1: replace(shoulder, found=replace(shoulder.found, p={**shoulder.p, "offset": APART}))}
     )
-    slope = per_offset(one, *(looked_at(x, elbow.p["delay"]) for x in (now[2], shifted[2])))[place]
+    slope = per_offset(one, *(searched_runs(x, elbow.p["delay"]) for x in (now[2], shifted[2])))[place]
     assert again.p["offset"] - one.p["offset"] == pytest.approx(0.03 * slope, rel=0.2)

@@ -7,7 +7,7 @@ import pytest
 
 from idbench.sim.errors import RobotError, ScenarioError
 from idbench.sim.limits.clearance import Clearance
-from idbench.sim.limits.motion_limits import KeepOut, MotionLimits, home_of, limits_of, surroundings
+from idbench.sim.limits.motion_limits import KeepOut, MotionLimits, home_position, limits_of, surroundings
 from idbench.sim.robot.robot import Robot
 from idbench.sim.trajectories import Fourier
 
@@ -91,7 +91,7 @@ def test_shipped_arms_are_clear_at_home():
         robot, asked = Robot.load(name), MotionLimits()
         limits = limits_of(robot, asked)
         clearance = Clearance(surroundings(name, asked), limits.position, 0.01)
-        assert clearance.distances(home_of(robot, asked, limits)[None], 0.05).min() > 0.01
+        assert clearance.distances(home_position(robot, asked, limits)[None], 0.05).min() > 0.01
         assert not clearance.left_out
 
 
@@ -120,7 +120,7 @@ def test_a_urdf_says_velocities_and_efforts_but_has_no_shapes(tmp_path):
 def test_limits_that_do_not_fit_say_what_to_write(balls, asked, message):
     robot, given = Robot.load(balls), MotionLimits(**asked)
     with pytest.raises(ScenarioError) as error:
-        home_of(robot, given, limits_of(robot, given))
+        home_position(robot, given, limits_of(robot, given))
     assert message in str(error.value)
 
 

@@ -6,7 +6,7 @@ import pytest
 
 from idbench.sim.robot.inverse_dynamics import coulomb_torque, inverse_dynamics
 from idbench.sim.robot.robot import Robot
-from idbench.sim.robot.time_steps import actuator_damping, seeming_inertia, torque_of_steps
+from idbench.sim.robot.time_steps import actuator_damping, apparent_rotor_inertia, torque_of_steps
 
 H = 0.002
 
@@ -72,7 +72,7 @@ def test_what_seems_inertia_is_that_of_the_damping_at_the_end_of_a_step(tmp_path
         ("RK4", ""),
     ):
         path.write_text(ARM.format(integrator, flag))
-        sizes[integrator + flag] = seeming_inertia(Robot.load(str(path)))
+        sizes[integrator + flag] = apparent_rotor_inertia(Robot.load(str(path)))
     kv, half = np.array([6.0, 4.0]), 0.35
     np.testing.assert_allclose(actuator_damping(Robot.load(str(path))), kv)
     np.testing.assert_allclose(sizes["implicitfast"], H * (kv + half))

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from idbench.experiments.errors import ExperimentError
-from idbench.experiments.identification.logs import sought_of
+from idbench.experiments.identification.logs import delay_method
 from idbench.experiments.identification.reading import ReadOptions, read
 from idbench.experiments.identification.request import Request
 from idbench.experiments.recording.audience import Audience
@@ -128,7 +128,7 @@ class Follower:
     @property
     def _delay(self) -> str | None:
         """What is asked for, but for an estimate: that comes at the end."""
-        return None if sought_of(self.options.delay) else self.options.delay
+        return None if delay_method(self.options.delay) else self.options.delay
 
     def _begun(self, log: MotionLog) -> "LiveIdentification":
         """Return what grows, begun with the first look; a recording of the motion is made for who watches alone."""

@@ -24,13 +24,13 @@ from idbench.experiments.identification.job import (
     request_of,
     summary_of,
 )
-from idbench.experiments.identification.logs import sought_of
+from idbench.experiments.identification.logs import delay_method
 from idbench.experiments.identification.request import Request
 from idbench.experiments.identification.robot_model import SCARA
 from idbench.experiments.judgement.judgement import Judgement, judge
 from idbench.experiments.judgement.remedies import checks
 from idbench.experiments.recording.audience import Audience
-from idbench.experiments.reports.estimates import conclusion, shown_whole, verdict_on
+from idbench.experiments.reports.estimates import conclusion, models_in_full, verdict_on
 from idbench.experiments.reports.printed import print_fit, print_held_out
 from idbench.experiments.results.attempts import Attempts
 from idbench.experiments.results.folder import ResultsFolder
@@ -65,7 +65,7 @@ def identify(options: Identify) -> None:
         options = _followed(stack, options, request, audience)
         with stages_of("identifying"):
             result = fit_of(*loaded_logs(with_own_parts(options), request))
-        whole_models = shown_whole(result, options.model is not None)
+        whole_models = models_in_full(result, options.model is not None)
         page.found |= {"experiment": "identify", "log": read[0].name, "path": str(read[0]), **summary_of(result)}
         kept = f"the estimates are printed{f', and with the logs in {folder.out}' if folder else ''}"
         with Attempts(kept, folder) as attempts:
@@ -95,7 +95,7 @@ def identify(options: Identify) -> None:
 def _checked(judgement: Judgement, options: Identify, attempts: Attempts) -> Mapping[str, Sequence[str]]:
     """Return what to check first."""
     with stages_of("checking"):
-        delay = sought_of(options.torque_delay) is None
+        delay = delay_method(options.torque_delay) is None
         return attempts.attempt("the checks", lambda: checks(judgement, delay=delay, trials=not options.no_trials)) or {}
 
 

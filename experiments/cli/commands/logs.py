@@ -75,7 +75,7 @@ def _understood(options: ShowLog) -> tuple[Guess, LogColumns]:
         return Guess(layout_of(path)), columns_of(path, options.reading)
     beside = None if options.force else LogLayout.beside(path)
     if beside:
-        return Guess(beside[0]), read_columns(path, _looked_at(beside[0]))
+        return Guess(beside[0]), read_columns(path, _currents_as_torques(beside[0]))
     try:
         found = guess(path)
     except UnknownColumnsError as error:
@@ -90,10 +90,10 @@ def _understood(options: ShowLog) -> tuple[Guess, LogColumns]:
         raise ExperimentError(
             f"{path} has no column of times that idbench recognises: say which with --columns t=NAME, or state fs in a log.toml"
         )
-    return found, read_columns(path, _looked_at(layout))
+    return found, read_columns(path, _currents_as_torques(layout))
 
 
-def _looked_at(layout: LogLayout) -> LogLayout:
+def _currents_as_torques(layout: LogLayout) -> LogLayout:
     """Return a layout whose currents count as torques where their gain is not known yet."""
     return replace(layout, gain=(1.0,)) if needs_gain(layout.tau.unit) and not layout.gain else layout
 

@@ -11,7 +11,7 @@ from idbench.experiments.errors import StudyError
 from idbench.experiments.recording.audience import Audience
 from idbench.experiments.results.folder import ResultsFolder
 from idbench.experiments.results.page import new_page, runs_of, shown
-from idbench.experiments.study.job import LARGEST_SHARD, pool_of, runs_of_shard, store_of
+from idbench.experiments.study.job import LARGEST_SHARD, runs_of_shard, store_of, worker_pool
 from idbench.experiments.study.run_study import run_missing
 from idbench.experiments.study.statistics import cells
 from idbench.experiments.study.store import Store, arrays
@@ -38,7 +38,7 @@ def study(options: StudyCommand) -> None:
     store = store_of(options, options.out, many=options.yes)
     folder = ResultsFolder(store.folder, "study", f"idbench study {store.study.name}", options.force)
     folder.check()
-    runs, pooled = runs_of_shard(options, store), pool_of(options, store)
+    runs, pooled = runs_of_shard(options, store), worker_pool(options, store)
     with watching.audience() as audience, shown(page), pooled as pool, store.held(), _kept(store):
         recording = _recording(store, audience) if watching.rerun else None
         receive = partial(_show, store, recording) if recording and audience else None

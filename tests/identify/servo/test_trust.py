@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from idbench.identify.servo import SERVO_FRICTIONS, JointLoad, Servo, ServoRun, identify_again, identify_servo
-from idbench.identify.servo.choice import choose_friction, lacks_of
+from idbench.identify.servo.choice import choose_friction, residuals_by_state
 from idbench.identify.servo.closed_loop import ServoLoop, count_of
 from idbench.identify.servo.mistakes import mistake_of
 from idbench.identify.servo.search import ServoSearch
@@ -84,9 +84,9 @@ def test_a_fit_says_where_it_lacks(fit):
     """A brake that the model does not have, while torque is off."""
     braked = simulated(0, Fo=0.1)
     lacking = identify_servo([braked], "coulomb", held={"a": 0.6, "Fs": 0.1, "Fv": 0.02})
-    assert lacks_of(lacking)[0].when == "torque is off"
-    assert sum(lack.share for lack in lacks_of(lacking)) == pytest.approx(1.0, abs=0.03)
-    assert lacks_of(lacking)[0].error > 2 * lacks_of(fit)[0].error
+    assert residuals_by_state(lacking)[0].when == "torque is off"
+    assert sum(lack.share for lack in residuals_by_state(lacking)) == pytest.approx(1.0, abs=0.03)
+    assert residuals_by_state(lacking)[0].error > 2 * residuals_by_state(fit)[0].error
 
 
 @pytest.mark.thorough
