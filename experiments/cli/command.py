@@ -9,6 +9,7 @@ from typing import Any, ClassVar, TypeVar, get_type_hints
 
 from idbench.experiments.cli.interruption import importing
 from idbench.experiments.cli.parser import word_of
+from idbench.experiments.program import program
 
 
 class Command:
@@ -47,7 +48,7 @@ def command_of(name: str, options: Any, positional: str, left_out: tuple[str, ..
     given = getattr(options, positional) if positional else ()
     values = given if isinstance(given, tuple) else () if given is None else (given,)
     words = [_word(x, absolute) for x in values]
-    return " ".join(["uv run idbench", name, *words, *_options(options, (positional, *left_out), absolute)])
+    return " ".join([program(), name, *words, *_options(options, (positional, *left_out), absolute)])
 
 
 def _options(part: Any, left_out: tuple[str, ...], absolute: bool) -> Iterator[str]:

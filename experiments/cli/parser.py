@@ -16,6 +16,7 @@ from tyro import _strings  # private: tyro keeps the line breaks of texts that a
 from tyro.constructors import PrimitiveConstructorSpec
 
 from idbench.experiments.errors import ExperimentError
+from idbench.experiments.program import program
 from idbench.experiments.requests.words import Word
 
 
@@ -177,7 +178,7 @@ def require_once(words: Sequence[str]) -> None:
 def _said(event: parser.ParseErrorEvent, words: Sequence[str], commands: Mapping[str, type]) -> str:
     """Return what is wrong, and what to type instead."""
     name = words[0]
-    help_ = f"uv run idbench {name} --help-all" if name in commands else "uv run idbench --help"
+    help_ = f"{program()} {name} --help-all" if name in commands else f"{program()} --help"
     match event:
         case parser.InvalidChoice():
             known = sorted(choice for choice in event.choices if choice != "None")

@@ -110,6 +110,8 @@ class Cause:
     """The first log."""
     gains: Sequence[float] = ()
     """Gains with which it was read, of all joints or of each, where some were given."""
+    turned: tuple[int, ...] = ()
+    """Joints whose torque has the other sign: one option mends them all."""
 
     @property
     def joint(self) -> str | None:
@@ -121,7 +123,7 @@ class Cause:
         """What is wrong, how sure, and what else it may be."""
         suspect, wording = self.suspect, self._wording
         what = wording.what.format(**self._values)
-        t = "" if np.isinf(suspect.t) else f" (t = {suspect.t:.0f})"
+        t = "" if np.isinf(suspect.t) else f" ({suspect.t:.0f} sigma)"
         others = ", ".join(dict.fromkeys(map(self._named, suspect.alternatives)))
         before = f"{self.joint}: " if self.joint else "all torques: " if wording.what.startswith("torque") else ""
         return f"{before}{what}{t}{f'; or {others}, which this log cannot distinguish' if others else ''}"
@@ -214,7 +216,9 @@ class Cause:
         j = s.joint or 0
         given = np.asarray(self.gains if len(self.gains) else 1.0) * np.asarray(self.log.torque.gain)
         gains = np.broadcast_to(given, (len(joints),)).copy()
-        gains[j] *= -1.0 if s.cause == "sign" else 1 / (1 + s.size[0]) if s.cause == "gain" else 1.0
+        gains[list(self.turned) if s.cause == "sign" else j] *= (
+            -1.0 if s.cause == "sign" else 1 / (1 + s.size[0]) if s.cause == "gain" else 1.0
+        )
         last = min(j + 1, len(joints) - 1)
         return {
             "size": f"{concise(size, sigma)}{unit}" if sigma else f"{size:.3g}{unit}",

@@ -85,7 +85,9 @@ class Fit:
         except (IdentificationError, np.linalg.LinAlgError):  # an estimate is not lost because its tests are
             return None
         log, gains = self.logs.fitted[0], self.logs.gains
-        return tuple(Cause(each, self.robot_model, log, gains) for each in (*self.silent, *suspects))
+        every = (*self.silent, *suspects)
+        turned = tuple(s.joint for s in every if (s.cause, s.of) == ("sign", "torque") and s.joint is not None)
+        return tuple(Cause(each, self.robot_model, log, gains, turned) for each in every)
 
     @cached_property
     def truth(self) -> dict[str, float] | None:

@@ -14,6 +14,7 @@ from idbench.experiments.identification.logs import DELAYS, with_delay
 from idbench.experiments.identification.poses import are_poses, poses_of
 from idbench.experiments.identification.request import Request
 from idbench.experiments.identification.robot_model import RobotModel
+from idbench.experiments.program import program
 from idbench.experiments.requests.shared import ColumnOptions
 from idbench.experiments.requests.words import Meaning
 from idbench.identify import Array, AsLogged, LogError, MotionLog, RangeError, SettingError, TimeError, TorqueChannel
@@ -131,7 +132,7 @@ def read(path: Path, options: ReadOptions, robot_model: RobotModel | None) -> Re
     except TimeError as error:
         late = f" --torque-delay {channel.delay:g}" if channel.delay else ""
         raise ExperimentError(
-            f"{path}: {error}: add --resample, or write it anew and look: uv run idbench resample {shlex.quote(str(path))} "
+            f"{path}: {error}: add --resample, or write it anew and look: {program()} resample {shlex.quote(str(path))} "
             f"--torque {channel.meaning}{late} --out uniform.parquet"
         ) from error
     return ReadLog(path, (log,), columns, channel, None, tuple(notes), options.columns.simulated)

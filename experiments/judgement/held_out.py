@@ -58,7 +58,7 @@ class Verdict:
     @cached_property
     def word(self) -> str:
         """good, fair or poor; unsure where noise or sigma would hide a poor model. None is good that shows a mistake."""
-        if self.wrong:
+        if self.wrong or any(cause.suspect.cause == "sign" for cause in self.causes):
             return "poor"
         beyond, hidden = (_worst(self.validation.percent_of_level(x)) for x in (self.validation.excess, self._hidden))
         if beyond > FAIR:

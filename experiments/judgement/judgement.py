@@ -48,13 +48,13 @@ class Judgement:
 
     @property
     def hardest(self) -> HeldOut | None:
-        """The held-out log on which the best model does worst; None if it was judged on none."""
-        return max(self.held_out, key=_best, default=None)
+        """The held-out log on which the leading model does worst; None if it was judged on none."""
+        return max(self.held_out, key=_place, default=None)
 
     @property
     def good(self) -> bool:
-        """Whether a model is good on every held-out log."""
-        return self.hardest is not None and WORDS[_best(self.hardest)] == "good"
+        """Whether the leading model is good on every held-out log."""
+        return self.hardest is not None and WORDS[_place(self.hardest)] == "good"
 
     def summary(self) -> dict[str, Any]:
         """Return what a summary.json says of it, beside the fit's own."""
@@ -62,9 +62,9 @@ class Judgement:
         return {"validation": each[0], "validations": each}
 
 
-def _best(one: HeldOut) -> int:
-    """Return the place, in WORDS, of the verdict on the best model."""
-    return min(WORDS.index(verdict.word) for verdict in one.verdicts.values())
+def _place(one: HeldOut) -> int:
+    """Return the place, in WORDS, of the verdict on the leading model, which is shown and written."""
+    return WORDS.index(one.verdicts[one.fit.leading].word)
 
 
 def judge(result: Fit) -> Judgement:

@@ -9,6 +9,7 @@ from idbench.experiments.identification.log_warnings import resting, unlike_file
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.identify import MotionLog, brisk_shares, showing_moves
 from idbench.identify.basis.block import NOT_NEGATIVE, named
+from idbench.identify.data.motion_log import never_logged
 from idbench.sim.robot.robot import Robot
 from idbench.sim.robot.time_steps import apparent_rotor_inertia
 from idbench.sim.robot.tree import kinematic_tree, unmodelled
@@ -153,7 +154,7 @@ def _badly_explained(fit: Fit, name: str) -> Iterator[str]:
     """Yield which torques a model does not explain: the log is suspected, unless another model explains them."""
     joints = fit.robot_model.robot.joints
     shares = dict(enumerate(fit.explained[name]))
-    still = set.intersection(*(set(log.unchanging) for log in fit.logs.fitted))
+    still = set.intersection(*({*log.unchanging, *log.missing} for log in fit.logs.fitted))
     if nothing := [joints[j] for j, share in shares.items() if np.isnan(share) and j not in still]:
         yield (
             f"no torque of {', '.join(nothing)} is left to explain, the mask leaves no row: nothing is identified of it, "
@@ -181,6 +182,9 @@ def hidden_notes(fit: Fit) -> list[str]:
     """Return which parameters the logs do not show, and what would show them."""
     if not fit.hidden:
         return []
+    if absent := never_logged(fit.logs.fitted):
+        names = ", ".join(fit.robot_model.robot.joints[j] for j in absent)
+        return [f"without the torque of {names}, {', '.join(fit.hidden)} are not shown: left out, as if zero"]
     moves = helpful_moves(fit.robot_model, fit.logs.fitted[0], fit.hidden)
     return [f"this log does not excite {', '.join(fit.hidden)}: left out, as if zero{f' ({moves})' if moves else ''}"]
 

@@ -118,7 +118,7 @@ def payload_of(asked: PayloadRequest) -> PayloadFit:
     if missing := [name for name in names if name not in robot.robot.names]:
         raise ExperimentError(
             f"--before {asked.before} is of another robot, or of other laws of friction: this one has no "
-            f"{', '.join(missing[:3])}"
+            f"{', '.join(missing[:3])}; give the options of that identification, such as --add offset or --friction"
         )
     judgement = replace(judgement, before=dict(zip(names, X.tolist(), strict=True)))
     return PayloadFit(judgement, {"fixed": with_known_robot(robot, names, X, C)}, notes)
@@ -235,11 +235,11 @@ def _before(path: Path) -> tuple[tuple[str, ...], Array, Array]:
         names = tuple(str(p["name"]) for p in parameters)
         X, C = np.array([float(p["value"]) for p in parameters]), np.array(content["covariance"], dtype=np.float64)
         if C.shape != (len(names),) * 2 or any(p["column"] is None for p in parameters):
-            raise ValueError("no base parameters with their covariance")
+            raise ValueError("they lack their covariance, or a column")
     except OSError as error:
         raise ExperimentError(f"--before {path}: {error.strerror}") from error
     except (ValueError, KeyError, TypeError, RecursionError) as error:
         raise ExperimentError(
-            f"--before {path} holds no base parameters of an arm ({error}): make it by idbench identify ... --write FILE.json"
+            f"--before {path} holds no base parameters of an arm: make it by idbench identify ... --write FILE.json"
         ) from error
     return names, X, C

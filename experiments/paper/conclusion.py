@@ -3,6 +3,7 @@
 import json
 from importlib.resources import files
 
+from idbench.experiments.program import program
 from idbench.experiments.study.ratios import RatioRow, conclusion
 
 
@@ -16,5 +17,5 @@ def known_ratios() -> list[RatioRow]:
 def conclusion_lines() -> list[str]:
     """Return what the paper's tables end with: the conclusion, and the command that computes it."""
     found = known_ratios()
-    of = f"{min(row['runs'] for row in found)} motions or more; uv run idbench study models --seeds 200"
+    of = f"{min(row['runs'] for row in found)} motions or more; {program()} study models --seeds 200"
     return [f"The paper's conclusion, with 95 % confidence intervals ({of}): {conclusion(found)}"]

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from idbench.experiments.errors import ExperimentError
+from idbench.experiments.program import program
 from idbench.experiments.recording.viewers import answers, reachable, served, start_viewer
 from idbench.experiments.requests.words import Count, Real, Url
 
@@ -62,7 +63,7 @@ class Watching:
 
     def hint(self, out: Path) -> str:
         """Return how to see what was written to `out`."""
-        return f"; see it: uv run idbench view {out}" if self.rerun else ""
+        return f"; see it: {program()} view {out}" if self.rerun else ""
 
     @contextmanager
     def audience(self) -> Iterator["Audience | None"]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from idbench.experiments.identification.causes import Cause
 from idbench.experiments.identification.fit import Fit
-from idbench.experiments.judgement.held_out import HeldOut, Verdict
+from idbench.experiments.judgement.held_out import FAIR, GOOD, Verdict
 from idbench.experiments.judgement.judgement import Judgement
 from idbench.experiments.judgement.warnings import FLAGS, LOG, doubtful, used
 from idbench.experiments.text import WORTHLESS, error_percentage, number, percent, relative
@@ -110,23 +110,10 @@ def _explained(share: float) -> str:
 LEAST = 0.01
 """Difference in sigma that means nothing."""
 
-SAME = 0.99
-"""Errors in multiples of an earlier model's from which on a later one is no better."""
-
 
 def models_in_full(fit: Fit, asked: bool) -> tuple[str, ...]:
     """Return the models whose tables are shown whole: all if they were asked for, else the first."""
     return tuple(fit.estimates) if asked else tuple(fit.estimates)[:1]
-
-
-def leading(errors: Mapping[str, Array]) -> str:
-    """Return the model with the least errors, shape (joint,) each, on average of their logarithms; of equals the first."""
-    first, *others = errors
-    for model in others:
-        ratio = np.log(np.maximum(errors[model], 1e-300) / np.maximum(errors[first], 1e-300))
-        if (ratio := ratio[np.isfinite(ratio)]).size and ratio.mean() < np.log(SAME):
-            first = model
-    return first
 
 
 def differing(fit: Fit, whole: Sequence[str]) -> Iterator[str]:
@@ -161,24 +148,24 @@ def conclusion(judgement: Judgement, warnings: Mapping[str, Sequence[str]]) -> t
 
 
 def verdict_on(judgement: Judgement) -> Verdict | None:
-    """Return the verdict on the model that predicts the hardest held-out log best; None if there is no such log."""
+    """Return the verdict on the leading model on the hardest held-out log; None if there is no such log."""
     one = judgement.hardest
-    return None if one is None else one.verdicts[_best_model(one)]
-
-
-def _best_model(one: HeldOut) -> str:
-    return leading({name: validation.rms for name, validation in one.torques.items()})
+    return None if one is None else one.verdicts[one.fit.leading]
 
 
 def _found(judgement: Judgement, causes: Sequence[Cause]) -> str:
     one, verdict = judgement.hardest, verdict_on(judgement)
     if one is None or verdict is None:
         return "Result: not validated"
-    model = _best_model(one)
+    model = one.fit.leading
     if verdict.wrong:
         return f"Result: {verdict.word} ({model} model): {verdict.wrong[0].partition(':')[0]}"
     worst = float(np.nanmax(np.nan_to_num(one.torques[model].percent, nan=0.0, posinf=np.inf)))
-    found = f"Result: {verdict.word} ({model} model), torque errors of at most {error_percentage(worst)} on {_short(one.title)}"
+    beyond = float(np.nanmax(np.nan_to_num(one.torques[model].percent_of_level(one.torques[model].excess), posinf=np.inf)))
+    most = {"good": GOOD, "fair": FAIR}.get(verdict.word, np.inf)
+    noisy = f", {error_percentage(beyond)} beyond noise and sigma," if beyond < most < worst else ""
+    off = f"torque errors of at most {error_percentage(worst)}{noisy}"
+    found = f"Result: {verdict.word} ({model} model), {off} on {_short(one.title)}"
     return "; ".join([found, *(cause.words for cause in causes[:1])])
 
 
@@ -199,4 +186,6 @@ def _next(judgement: Judgement, of_log: str, first: str) -> str:
         return "next: --write arm.urdf arm.json arm.py keeps the robot"
     if judgement.fit.logs.fitted[0].poses:
         return "next: more poses"
-    return "next: a longer or more exciting motion (idbench excite), or another law of friction (--friction auto)"
+    asked = judgement.fit.request.robot_model.asked.friction
+    law = "" if judgement.fit.choice is not None or asked != ("standard",) else ", or another law of friction (--friction auto)"
+    return f"next: a longer or more exciting motion (idbench excite){law}"

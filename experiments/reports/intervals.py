@@ -1,4 +1,4 @@
-"""Estimates as intervals in the rows of a table: each in its own unit, beside zero and what the robot's file says."""
+"""Estimates as intervals in the rows of a table, in % of their values on one axis, beside what the robot's file says."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -6,13 +6,20 @@ from dataclasses import dataclass
 import numpy as np
 
 from idbench.experiments.identification.fit import Fit
-from idbench.experiments.judgement.warnings import doubtful
+from idbench.experiments.judgement.warnings import WEAK, doubtful
 from idbench.experiments.reports.figures import color_of
 from idbench.experiments.text import SIGMAS, relative
+from idbench.identify.arrays import TINY
 from idbench.identify.tables import concise
 
 WIDE, HIGH = 220.0, 14.0
 """Size of an interval's picture [px]."""
+
+WHOLE, LEAST = 100.0, 0.01
+"""How far the axis of intervals goes at most, and at least [% of the values]."""
+
+ROUNDING = 1e-12
+"""Value of a file's parameter that is rounding of 0: those that are grouped are sums of products."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +39,7 @@ class ParameterRow:
     interval: str
     """The 95 % intervals of all models as SVG."""
     made_of: str
-    """The standard parameters that are grouped in it."""
+    """The standard parameters that are grouped in it; empty if it is one."""
     link: str
     """The joint that it belongs to."""
 
@@ -40,7 +47,7 @@ class ParameterRow:
 def parameter_rows(fit: Fit) -> Iterator[ParameterRow]:
     """Yield the parameters, by link."""
     lead, marks = fit.estimates[fit.leading], doubtful(fit)[fit.leading]
-    stated = fit.truth or {name: x for name, x in fit.robot_model.truth(fit.robot_model.robot).items() if x}
+    stated, reach = fit.truth or fit.robot_model.truth(fit.robot_model.robot), interval_reach(fit)
     made, joints = fit.robot_model.grouping.groupings, fit.robot_model.robot.joints
     for i in fit.basis.without_random_effects:
         parameter = fit.basis.parameters[i]
@@ -51,38 +58,38 @@ def parameter_rows(fit: Fit) -> Iterator[ParameterRow]:
             f"{concise(x, sigma)}{''.join(marks[i]).strip()}",
             parameter.unit,
             relative(x, sigma),
-            "" if filed is None else f"{filed:.4g}",
-            _interval(fit, i, filed),
-            made.get(parameter.name, ""),
+            "" if filed is None else f"{filed if abs(filed) > ROUNDING else 0.0:.4g}",
+            _interval(fit, i, filed, reach),
+            "" if made.get(parameter.name) == parameter.name else made.get(parameter.name, ""),
             joints[parameter.joint] if parameter.joint is not None else "",
         )
 
 
-def _interval(fit: Fit, i: int, filed: float | None) -> str:
-    """Return the estimates of a parameter with their 95 % intervals, on a scale that holds the leading one."""
-    X = np.array([estimate.X[i] for estimate in fit.estimates.values()])
-    half = np.array([SIGMAS * estimate.standard_errors[i] for estimate in fit.estimates.values()])
-    first = X[0]
-    ends = [first - half[0], first + half[0], *([] if filed is None else [filed])]
-    if min(abs(first), abs(first) - half[0]) < np.ptp(ends):  # zero would squeeze what is known well
-        ends.append(0.0)
-    room = 0.15 * (max(ends) - min(ends)) or 0.1 * abs(first) or 1.0
-    low, high = min(ends) - room, max(ends) + room
-    if not np.isfinite([low, high]).all():
+def interval_reach(fit: Fit) -> float:
+    """Return how far the axis of the intervals goes to either side [% of the values]: as parameters need that are known."""
+    lead = fit.estimates[fit.leading]
+    share = 100 * SIGMAS * lead.standard_errors / np.maximum(np.abs(lead.X), TINY)
+    known = share[np.isfinite(share) & (share < 100 * SIGMAS * WEAK)]
+    return min(1.2 * float(np.max(known, initial=LEAST)), WHOLE)
+
+
+def _interval(fit: Fit, i: int, filed: float | None, reach: float) -> str:
+    """Return the differences of a parameter's estimates from the leading one with their 95 % intervals, cut at the axis."""
+    first = float(fit.estimates[fit.leading].X[i])
+    if not (np.isfinite(first) and first):
         return ""
 
     def at(x: float) -> float:
-        return float(np.clip(WIDE * (x - low) / (high - low), 0.0, WIDE))
+        share = 100 * (x - first) / abs(first) if np.isfinite(x) else 0.0
+        return float(np.clip(WIDE * (1 + share / reach) / 2, 0.0, WIDE))
 
-    parts = [f'<svg class="interval" viewBox="0 0 {WIDE:g} {HIGH:g}">']
-    if low < 0 < high:
-        parts.append(f'<path d="M{at(0):.1f},0v{HIGH:g}" stroke="#bbb"/>')
+    parts = [f'<svg class="interval" viewBox="0 0 {WIDE:g} {HIGH:g}">', f'<path d="M{WIDE / 2:g},0v{HIGH:g}" stroke="#bbb"/>']
     if filed is not None:
         parts.append(f'<path d="M{at(filed):.1f},1v{HIGH - 2:g}" stroke="#000" stroke-width="2"/>')
-    for k, model in enumerate(fit.estimates):
-        y = HIGH * (k + 1) / (len(X) + 1)
-        color = color_of(model)
-        if np.isfinite(X[k] + half[k]):
-            parts.append(f'<path d="M{at(X[k] - half[k]):.1f},{y:.1f}H{at(X[k] + half[k]):.1f}" stroke="{color}"/>')
-            parts.append(f'<circle cx="{at(X[k]):.1f}" cy="{y:.1f}" r="2" fill="{color}"/>')
+    for k, (model, estimate) in enumerate(fit.estimates.items()):
+        x, half = float(estimate.X[i]), SIGMAS * float(estimate.standard_errors[i])
+        y, color = HIGH * (k + 1) / (len(fit.estimates) + 1), color_of(model)
+        if np.isfinite(x + half):
+            parts.append(f'<path d="M{at(x - half):.1f},{y:.1f}H{at(x + half):.1f}" stroke="{color}"/>')
+            parts.append(f'<circle cx="{at(x):.1f}" cy="{y:.1f}" r="2" fill="{color}"/>')
     return "".join([*parts, "</svg>"])

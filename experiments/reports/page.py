@@ -13,7 +13,7 @@ from idbench.experiments.identification.fit import Fit
 from idbench.experiments.judgement.held_out import HeldOut
 from idbench.experiments.judgement.judgement import Judgement, Unjudged
 from idbench.experiments.judgement.warnings import FLAGS, doubtful, used
-from idbench.experiments.reports.estimates import conclusion, leading, verdict_on
+from idbench.experiments.reports.estimates import conclusion, verdict_on
 from idbench.experiments.reports.figures import (
     causes_figure,
     color_of,
@@ -23,7 +23,7 @@ from idbench.experiments.reports.figures import (
     spectra_figure,
     torques_figure,
 )
-from idbench.experiments.reports.intervals import parameter_rows
+from idbench.experiments.reports.intervals import interval_reach, parameter_rows
 from idbench.experiments.reports.uncertainty import correlated, error_shares
 from idbench.experiments.results.attempts import Attempts
 from idbench.experiments.text import percentage
@@ -93,6 +93,7 @@ def _of_estimates(fit: Fit) -> dict[str, Any]:
         "models": [(model, color_of(model)) for model in fit.estimates],
         "leading": fit.leading,
         "filed": "true value" if fit.truth else "robot's file",
+        "reach": f"{interval_reach(fit):.2g}",
         "parameters": [(link, list(rows)) for link, rows in groupby(parameter_rows(fit), lambda row: row.link)],
         "legend": "; ".join(f"{flag} {FLAGS[flag]}" for flag in used({fit.leading: marks})),
         "correlated": correlated(lead)[:LONGEST],
@@ -128,7 +129,7 @@ def _held_out(one: HeldOut, attempts: Attempts) -> tuple[str, str, str, list[str
 
 def _torque_errors(one: HeldOut) -> Iterator[list[str]]:
     """Yield, of each joint, the rms torque error on a held-out log, and what of it is noise, sigma, the model."""
-    found = one.torques[leading({model: validation.rms for model, validation in one.torques.items()})]
+    found = one.torques[one.fit.leading]
     for j, joint in enumerate(one.fit.robot_model.robot.joints):
         parts = (found.rms[j], found.noise[j], found.open[j], found.excess[j])
         unit = one.fit.robot_model.units(j)[0]

@@ -13,14 +13,15 @@ from rich.text import Text
 from idbench.experiments.identification.causes import words_of_diagnosis
 from idbench.experiments.identification.fit import Fit
 from idbench.experiments.identification.iterations import words_of_iterations
-from idbench.experiments.judgement.held_out import HeldOut
+from idbench.experiments.judgement.held_out import WORDS, HeldOut
 from idbench.experiments.judgement.judgement import Unjudged
 from idbench.experiments.judgement.remedies import NEGLIGIBLE, SURE
-from idbench.experiments.reports.estimates import EstimatesTable, differing, explained, leading
+from idbench.experiments.reports.estimates import EstimatesTable, differing, explained
 from idbench.experiments.reports.uncertainty import words_of_uncertainty
-from idbench.experiments.text import new_table, percentage, print_titled
-from idbench.identify import Array, AsLogged
+from idbench.experiments.text import error_percentage, new_table, percentage, print_titled
+from idbench.identify import Array, AsLogged, TorqueChannel
 from idbench.identify.judge.torque_interval import LEVEL, MOST
+from idbench.identify.tables import concise
 
 ONE_BELOW_THE_OTHER = 16
 """Parameters up to which each has a line of its own; more stand beside each other, as far as the screen is wide."""
@@ -114,11 +115,10 @@ def _told(fit: Fit) -> Iterator[str]:
         known = (("held", asked.hold), ("tied", asked.tie))
         yield "; ".join(f"{what}: {', '.join(words)}" for what, words in known if words)
     if not fit.logs.fitted[0].poses:
-        sure = np.atleast_1d(channel.delay_sigma)
-        how_sure = f", estimated from the log, sigma {', '.join(f'{1e3 * x:.2g}' for x in sure)} ms" if sure.any() else ""
         is_early = channel.delay < -NEGLIGIBLE / fit.logs.fitted[0].fs and not channel.lags
         early = f" (it is logged {1e3 * -channel.delay:.4g} ms after it acts)" if is_early else ""
-        yield f"torque: {channel.meaning}, delay {channel.late}{early}{how_sure}{ignored if logged else ''}"
+        found = ", estimated from the log" if np.any(channel.delay_sigma) else ""
+        yield f"torque: {channel.meaning}, delay {_delay(channel)}{early}{found}{ignored if logged else ''}"
     if fit.delay is not None:
         delay, sigma = (1e3 * x for x in fit.delay)
         words = f"delay found with the parameters: {delay:.4g} ms, sigma {sigma:.2g} ms"
@@ -139,6 +139,13 @@ def _told(fit: Fit) -> Iterator[str]:
         share = fit.request.share or fit.robot_model.roughly_known.share
         near = f"; links near the file's, to {100 * share:.0f} % as the log decides" if fit.request.share and share else ""
         yield f"roughly known: {', '.join(fit.robot_model.asked.prior)}{near}"
+
+
+def _delay(channel: TorqueChannel) -> str:
+    """Return a delay, or that of each joint, with its standard error if it has one."""
+    lags = channel.lags or (0.0,)
+    sigma = np.broadcast_to(channel.delay_sigma, len(lags))
+    return f"{', '.join(concise(1e3 * (channel.delay + lag), 1e3 * s) for lag, s in zip(lags, sigma, strict=True))} ms"
 
 
 def _details(fit: Fit, complete: bool) -> Iterator[str]:
@@ -241,6 +248,11 @@ def print_held_out(console: Console, one: HeldOut | Unjudged, whole: Sequence[st
     print_titled(console, f"{one.title}: {title}", grid)
     for model in (model for model, v in one.verdicts.items() if model in torques and v.unsimulated):
         console.print(Text(f"{model}: not simulated: {one.verdicts[model].unsimulated}"), soft_wrap=True)
+    worst = one.verdicts[one.fit.leading].word
+    for model, verdict in one.verdicts.items():
+        if model not in torques and WORDS.index(verdict.word) > WORDS.index(worst):
+            off = error_percentage(float(np.nanmax(one.torques[model].percent)))
+            console.print(Text(f"{model}: {verdict.word}, torque errors of at most {off}"), soft_wrap=True)
     for words in _details_of(one, first.standing) if verbose else ():
         console.print(Text(words), soft_wrap=True)
     console.print()
@@ -248,7 +260,7 @@ def print_held_out(console: Console, one: HeldOut | Unjudged, whole: Sequence[st
 
 def _details_of(one: HeldOut, standing: Array) -> Iterator[str]:
     """Yield intervals, errors at rest, and the verdict on each model."""
-    best = leading({model: validation.rms for model, validation in one.torques.items()})
+    best = one.fit.leading
     joints = one.fit.robot_model.robot.joints
     if (within := one.within_interval(best)) is not None and one.fit.torque_intervals[best] is not None:
         yield _interval_words(one, best, *within)

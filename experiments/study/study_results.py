@@ -13,6 +13,7 @@ from rich.console import Console
 from rich.text import Text
 
 from idbench.experiments.errors import ResultsError
+from idbench.experiments.program import program
 from idbench.experiments.reports.figures import rendered
 from idbench.experiments.results.attempts import Attempts
 from idbench.experiments.results.folder import ResultsFolder
@@ -141,7 +142,7 @@ def command(study: Study, folder: Path, cell: Cell, run: int) -> str:
     """Return what makes a run again, identified as in a cell."""
     number = next(i for i, found in enumerate(study.methods) if found.names == cell.names[:2] and found.fits(cell.settings))
     chosen = f" --method {number}" if number else ""
-    return f"uv run idbench run --from {quote(str(folder))} --index {run}{chosen}"
+    return f"{program()} run --from {quote(str(folder))} --index {run}{chosen}"
 
 
 def _family(title: str, cells: Sequence[Cell], axis: Axis) -> dict[str, Any]:

@@ -50,6 +50,10 @@ def require_file(path: Path) -> None:
         raise LogError(f"{path} is {what}: a log is read more than once; write it to a file, such as log.csv, and name that")
 
 
+ROBOTS = (".urdf", ".mjcf", ".xacro")
+"""Endings of files of robots, which are easily given in the place of a log."""
+
+
 def read_table(path: Path) -> LogTable:
     """Return what a file holds.
 
@@ -61,6 +65,10 @@ def read_table(path: Path) -> LogTable:
     if is_data_set(path):
         path = data_file(path)
     bag = path.is_dir() and (path / "metadata.yaml").is_file()
+    if path.is_dir() and not bag:
+        raise LogError(f"{path} is a folder: give a file in it, such as its log.parquet")
+    if path.suffix.lower() in ROBOTS:
+        raise LogError(f"{path} is the file of a robot, no log: --robot {path} names it")
     if not bag and (way_out := FOREIGN.get(kind_of(path))):
         raise LogError(f"idbench reads no {kind_of(path)} ({path}): {way_out}. It reads {', '.join(FORMATS)}")
     reader = read_bag if bag else FORMATS.get(kind_of(path), read_parquet)

@@ -8,7 +8,7 @@ import numpy as np
 from idbench.identify.arrays import Array
 from idbench.identify.basis.basis import Basis
 from idbench.identify.data.motion_log import MotionLog, TorqueChannel
-from idbench.identify.errors import LogError, RangeError, SettingError
+from idbench.identify.errors import ExcitationError, LogError, RangeError, SettingError
 from idbench.identify.estimators.log_rows import DELAY_STEP
 from idbench.identify.estimators.problem import Problem
 from idbench.identify.minimum import minimum
@@ -103,7 +103,7 @@ def estimate_delay(
     SettingError
         If the range is empty, the chain does not read the delay, or the best delay lies at an end of the range.
     ExcitationError
-        If the motion does not excite the parameters.
+        If the motion excites none of the parameters; those that it does not excite count as zero.
     """
     logs = manageable([log] if isinstance(log, MotionLog) else list(log))
     if any(one.q.ndim != 2 for one in logs):
@@ -116,6 +116,8 @@ def estimate_delay(
     while True:
         try:
             return _Search(logs, basis, chain, (low, high)).run()
+        except ExcitationError as error:
+            basis = _without_hidden(basis, error)
         except RangeError:
             if within or high >= farthest or not _is_read(logs, chain):
                 raise
@@ -145,6 +147,10 @@ def estimate_joint_delays(
     """
     common = estimate_delay(log, basis, chain, within)
     logs = manageable([log] if isinstance(log, MotionLog) else list(log))
+    try:
+        Problem(tuple(logs), basis, ExplicitModel(), chain or idbench_chain()).rows.factors.together.check()
+    except ExcitationError as error:
+        basis = _without_hidden(basis, error)
     delays, sigma = np.full(basis.n, common.delay), np.zeros(basis.n)
     for _ in range(ROUNDS):
         mean = float(delays.mean())
@@ -159,6 +165,13 @@ def estimate_joint_delays(
     raise RangeError(
         "the delays of the joints do not settle: does the model fit the robot? `estimate` finds one delay for all joints"
     )
+
+
+def _without_hidden(basis: Basis, error: ExcitationError) -> Basis:
+    """Return the basis without what no torque depends on here, whenever it acts; raise the error if nothing is left."""
+    if not error.hidden or len(error.hidden) >= len(basis.names):
+        raise error
+    return basis.without(*error.hidden)
 
 
 def nearby_delay(problem: Problem) -> DelayEstimate:

@@ -6,13 +6,14 @@ from dataclasses import replace
 import numpy as np
 import scipy
 
-from idbench.identify.arrays import TINY, Array
+from idbench.identify.arrays import HELD, TINY, Array
 from idbench.identify.basis.block import Kind
 from idbench.identify.data.motion_log import MotionLog
 from idbench.identify.estimators.problem import Problem
 from idbench.identify.judge.small_mistakes import small_mistakes
 from idbench.identify.judge.suspect import Suspect
 from idbench.identify.judge.whole_mistakes import whole_mistake
+from idbench.identify.signals.signals import State
 
 BALANCED, KNOWN = 0.1, 4.0
 """Share of its terms that a joint without a drive has as residual at most: what balances, balances to its noise; and sigma of
@@ -23,6 +24,9 @@ DRIVING: tuple[Kind, ...] = ("viscous friction", "Coulomb friction")
 
 MOVES = 100.0
 """Standard deviations of the noise of a position beyond which a joint moves, and does not flicker by a count."""
+
+STATES = 100
+"""Of a log, at which inertias are looked at."""
 
 SAMPLES = 20.0
 """Samples for each period of the operator's cut-off with which large mistakes are looked for."""
@@ -43,24 +47,65 @@ def diagnosed(problem: Problem, X: Array) -> tuple[Suspect, ...]:
     whole = whole_mistake(_thinned(problem.explicit), small[0] if small else None)
     if whole and small and (whole.cause, whole.joint) == (small[0].cause, small[0].joint):
         small, whole = (whole, *small[1:]), None
-    return (whole,) if whole else (*_driven_by_friction(problem.explicit, X), *small)
+    if whole and (whole.cause, whole.of) == ("sign", "torque"):
+        return tuple(_with_positive_inertia(problem.explicit, whole))
+    return (whole,) if whole else (*_impossible_signs(problem.explicit, X), *small)
 
 
-def _driven_by_friction(problem: Problem, X: Array) -> Iterator[Suspect]:
-    """Yield joints whose friction would drive them: their torque has the other sign, which their residuals need not show.
+def _with_positive_inertia(problem: Problem, sign: Suspect) -> Iterator[Suspect]:
+    """Yield the torques whose other sign explains the rows with positive inertias: one, or all others.
 
-    Where others feel little of a joint, all of its parameters change their sign with its torque.
+    With all torques negative, all parameters are, and residuals are the same.
+    """
+    n = problem.basis.n
+    turned = np.where(np.arange(n) == sign.joint, -1.0, 1.0)
+    flipped = problem.with_logs([replace(log, tau=log.tau * turned) for log in problem.logs])
+    fit = flipped.factors.fit(2)
+    inertias = _mean_inertias(flipped, fit.X, fit.factor.inverse(np.array(fit.factor.determined)))
+    others = [j for j in range(n) if j != sign.joint and inertias[j]]
+    yield from (replace(sign, joint=j) for j in (others if others and np.sum(inertias) < 0 else [sign.joint]))
+
+
+def _impossible_signs(problem: Problem, X: Array) -> Iterator[Suspect]:
+    """Yield joints whose friction would drive them, or whose inertia M_jj would be negative: their torque has the other sign.
+
+    Where others feel little of a joint, all of its parameters change their sign with its torque, and residuals do not show it.
     """
     factor = problem.factors.fit(2).factor
-    sigma = np.sqrt(np.diagonal(factor.inverse(np.array(factor.determined))))
+    C = factor.inverse(np.array(factor.determined))
+    sigma, inertias = np.sqrt(np.diagonal(C)), _mean_inertias(problem, X, C)
     of_kind = {(p.kind, p.joint): k for k, p in enumerate(problem.basis.parameters)}
     for j in range(problem.basis.n):
         places = [of_kind.get((kind, j)) for kind in DRIVING]
         t = [0.0 if k is None else float(X[k] / max(sigma[k], TINY)) for k in places]
+        t = [max(t)] if max(t) < inertias[j] else [inertias[j]]
         if max(t) < -KNOWN:
             yield Suspect(
                 "sign", "torque", j, (-1.0,), (0.0,), "1", float(scipy.special.ndtr(max(t))), -max(t), (), (0.0, 0.0), 0.0
             )
+
+
+def _mean_inertias(problem: Problem, X: Array, C: Array) -> Array:
+    """Return the mean inertia of each joint along the first log, M_jj = c X with c of a unit velocity, over its sigma.
+
+    0 where a joint has none.
+    """
+    basis, q = problem.basis, problem.signals[0].state.q
+    q = np.ascontiguousarray(q[..., :: max(1, q.shape[-1] // STATES)])
+    found = np.zeros(basis.n)
+    for j in range(basis.n):
+        unit = np.zeros_like(q)
+        unit[j] = 1.0
+        columns = basis.momentum(State(q, unit, lambda _: np.zeros_like(q)))
+        c, held = np.zeros(len(X)), 0.0
+        for (row, place), column in columns.items():
+            if row == j and place == HELD:
+                held += float(np.mean(column))
+            elif row == j:
+                c[place] += float(np.mean(column))
+        variance = float(c @ C @ c)
+        found[j] = (c @ X + held) / np.sqrt(variance) if variance > 0 else 0.0
+    return found
 
 
 def _thinned(problem: Problem) -> Problem:

@@ -8,6 +8,7 @@ from idbench.experiments.cli.options.tools import Check, New
 from idbench.experiments.contracts.contract import Example
 from idbench.experiments.contracts.contracts import found, keeps
 from idbench.experiments.errors import ExperimentError
+from idbench.experiments.program import program
 from idbench.experiments.results.page import new_page, stages_of
 from idbench.experiments.starters.starters import new_example, new_plugin, new_scenario, new_set, new_study
 
@@ -18,20 +19,20 @@ def begin(options: New) -> None:
     page, out = new_page(), options.out or Path(options.name if folder else f"{options.name}.toml")
     if options.what == "scenario":
         new_scenario(options.name, options.like, out)
-        how = f"uv run idbench run {out}"
+        how = f"{program()} run {out}"
     elif options.what == "study":
         new_study(options.name, out)
-        how = f"uv run idbench study {out}"
+        how = f"{program()} study {out}"
     elif options.what == "set":
-        then = f"uv run idbench benchmark {out}"
+        then = f"{program()} benchmark {out}"
         how = f"get the data, in {out}:\n{new_set(options.name, out).strip()}\nthen: {then}"
     elif options.what == "example":
         with stages_of("simulating an arm"):
             new_example(options.name, options.robot, out)
-        how = f"uv run idbench identify {out / 'log.csv'} --robot {out / 'arm.xml'} --torque held --torque-delay estimate"
+        how = f"{program()} identify {out / 'log.csv'} --robot {out / 'arm.xml'} --torque held --torque-delay estimate"
     else:
         new_plugin(options.name, options.kind, out)
-        how = f"uv pip install -e {out}, then: uv run idbench check {options.name}"
+        how = f"uv pip install -e {out}, then: {program()} check {options.name}"
     page.print(Text(f"written to {out}; next: {how}"), soft_wrap=True)
     page.close()
 

@@ -13,6 +13,7 @@ from idbench.experiments.excite.job import designed, excited, files_of
 from idbench.experiments.excite.motion_file import write_motion
 from idbench.experiments.excite.sequence import MotionSequence
 from idbench.experiments.judgement.warnings import FILE, warnings_of_robot
+from idbench.experiments.program import program
 from idbench.experiments.recording.audience import Audience
 from idbench.experiments.reports.excite import print_excited, print_sequence
 from idbench.experiments.results.folder import ResultsFolder
@@ -42,13 +43,13 @@ def excite(options: Excite) -> None:
         page.warn({FILE: warnings_of_robot(robot), "limits": looser(robot, design.asked)})
         if sequence:
             print_sequence(page, sequence)
-        what, hint = command.removeprefix("uv run idbench excite "), options.watching.hint(folder.out)
+        what, hint = command.removeprefix(f"{program()} excite "), options.watching.hint(folder.out)
         summary = found.summary() | {"path": what} | (sequence.summary() if sequence else {})
         with saved(page, folder, summary, _files(found, sequence), hint) as attempts:
             attempts.file("report.html", lambda: _report(found, command))
             if options.watching.rerun:
                 attempts.recording(lambda: _recorded(found, audience))
-        page.print(f"try it on the simulated robot: uv run idbench run {folder.out / 'scenario.toml'}", soft_wrap=True)
+        page.print(f"try it on the simulated robot: {program()} run {folder.out / 'scenario.toml'}", soft_wrap=True)
 
 
 def _files(found: Excited, sequence: MotionSequence | None) -> Files:

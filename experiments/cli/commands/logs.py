@@ -13,6 +13,7 @@ from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.logs import LogFacts
 from idbench.experiments.identification.reading import channel_of, columns_of, stated_by
 from idbench.experiments.identification.robot_model import SCARA
+from idbench.experiments.program import program
 from idbench.experiments.results.attempts import Attempts
 from idbench.experiments.results.page import Page, new_page, shown
 from idbench.experiments.results.writing import folder_for, new_file, require_free, write_text
@@ -68,7 +69,7 @@ def _draw(page: Page, options: ShowLog, facts: LogFacts) -> None:
 
 def _understood(options: ShowLog) -> tuple[Guess, LogColumns]:
     """Return what the columns are, stated or guessed, and the columns."""
-    path = options.log
+    path = options.log if options.log.name else options.log.resolve()  # the folder in which one is
     if path.suffix.lower() == LAYOUT_FILE:
         return Guess(LogLayout.read(path)), read_columns(path)
     if options.reading.stated:
@@ -191,7 +192,7 @@ def export(options: Export) -> None:
             with new_file(target, "--out", force=options.force) as file:
                 _write_log(log, file)
             options_of = f"--torque {log.torque.meaning} --torque-delay {log.torque.delay:g}{_robot_of(options.folder)}"
-            page.print(f"written to {target}; uv run idbench identify {target} {options_of}", soft_wrap=True)
+            page.print(f"written to {target}; {program()} identify {target} {options_of}", soft_wrap=True)
 
 
 def _robot_of(folder: Path) -> str:

@@ -16,6 +16,7 @@ from idbench.experiments.identification.robot_model import SCARA
 from idbench.experiments.identification.scenario_run import ScenarioRun
 from idbench.experiments.judgement.warnings import FILE, LOG, warnings_of_robot
 from idbench.experiments.plugin_tables import plugin_conflicts
+from idbench.experiments.program import program
 from idbench.experiments.reports.estimates import models_in_full
 from idbench.experiments.reports.printed import print_fit
 from idbench.experiments.results.folder import ResultsFolder
@@ -72,7 +73,7 @@ def _files(ran: ScenarioRun) -> Files:
 def _as_servos(scenario: Scenario, out: Path) -> str:
     """Return the command that identifies the servos of a run."""
     words = f"{quote(str(out / 'log.parquet'))} --robot {quote(scenario.robot)} --servo {quote(str(out / 'servo.toml'))}"
-    return f"the torque above is that of the motors' currents; from commands and positions alone: uv run idbench servo {words}"
+    return f"the torque above is that of the motors' currents; from commands and positions alone: {program()} servo {words}"
 
 
 def _print_run(page: Page, ran: ScenarioRun, *, verbose: bool) -> None:

@@ -1,6 +1,7 @@
 """The command that writes scenarios."""
 
 from idbench.experiments.cli.options.tools import WriteScenario
+from idbench.experiments.program import program
 from idbench.experiments.results.page import new_page
 from idbench.experiments.results.writing import require_free, write_text
 from idbench.sim.scenario.scenario_file import designed, load, names, to_toml
@@ -19,5 +20,5 @@ def write(options: WriteScenario) -> None:
     else:
         require_free(options.out, "--out", force=options.force)
         write_text(options.out, to_toml(load(options.name)), "--out", force=options.force)
-        page.out(f"written to {options.out}; run it: uv run idbench run {options.out}")
+        page.out(f"written to {options.out}; run it: {program()} run {options.out}")
     page.close()

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from idbench.experiments.cli.options.jobs import StudyCommand
 from idbench.experiments.errors import StudyError
+from idbench.experiments.program import program
 from idbench.experiments.recording.audience import Audience
 from idbench.experiments.results.folder import ResultsFolder
 from idbench.experiments.results.page import new_page, runs_of, shown
@@ -71,6 +72,6 @@ def _kept(store: Store) -> Iterator[None]:
         yield
     except (KeyboardInterrupt, SystemExit):
         kept = store.study.size - sum(len(r) for r in store.missing(LARGEST_SHARD))
-        message = f"{kept:,} of {store.study.size:,} runs are kept; go on with: uv run idbench study --resume {store.folder}"
+        message = f"{kept:,} of {store.study.size:,} runs are kept; go on with: {program()} study --resume {store.folder}"
         sys.stderr.write(f"\nidbench: {message}\n")
         raise

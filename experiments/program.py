@@ -1,0 +1,16 @@
+"""What the program is called where it runs: in a clone `uv run idbench`, installed `idbench`."""
+
+import sys
+from functools import cache
+from pathlib import Path
+
+
+@cache
+def program() -> str:
+    """Return what to type to run it: environments of a clone lie beside its pyproject.toml."""
+    beside = Path(sys.prefix).parent / "pyproject.toml"
+    try:
+        cloned = 'name = "idbench"' in beside.read_text(encoding="utf-8")
+    except OSError:
+        cloned = False
+    return "uv run idbench" if cloned else "idbench"

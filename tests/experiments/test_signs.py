@@ -1,0 +1,50 @@
+"""Torques with the other sign, and one that was not logged, on two links: whose residuals may not show it."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from idbench.experiments.cli import main
+from idbench.identify.files.log_file import write_log
+from idbench.sim.engine.run import ideal_log
+from idbench.sim.robot.robot import Robot
+from idbench.sim.trajectories import RandomMoves
+
+
+@pytest.fixture(scope="module")
+def log():
+    robot = Robot.load("two_link")
+    found = ideal_log(robot, RandomMoves(moves=14, durations=(0.6, 1.2), velocity=(4.0,), rest=0.1).sample(robot, 200.0))
+    noise = 0.002 * found.tau.std(axis=0) * np.random.default_rng(2).standard_normal(found.tau.shape)
+    return replace(found, tau=found.tau + noise)
+
+
+@pytest.mark.parametrize("signs", [(-1, 1), (1, -1), (-1, -1)])
+def test_a_torque_with_the_other_sign_is_no_fair_result(log, signs, tmp_path, capsys):
+    write_log(replace(log, tau=log.tau * signs), tmp_path / "log.csv")
+    assert main(["identify", str(tmp_path / "log.csv"), "--robot", "two_link", "--torque", "instantaneous"]) == 0
+    first, then = capsys.readouterr().out.splitlines()[:2]
+    assert first.startswith("Result: poor")
+    assert then == f"next: --gain {signs[0]} {signs[1]}"
+
+
+def test_the_right_signs_are_good(log, tmp_path, capsys):
+    write_log(log, tmp_path / "log.csv")
+    assert main(["identify", str(tmp_path / "log.csv"), "--robot", "two_link", "--torque", "instantaneous"]) == 0
+    assert capsys.readouterr().out.startswith("Result: good (explicit model)")
+
+
+@pytest.mark.parametrize("delay", ["estimate", "joints", "0"])
+def test_a_torque_that_was_not_logged_hides_what_only_it_shows(log, delay, tmp_path, capsys):
+    """Also where the delay is sought; nobody is told to move the joint more."""
+    write_log(log, tmp_path / "log.csv")
+    lines = (tmp_path / "log.csv").read_text().splitlines()
+    kept = [",".join(line.split(",")[:-1]) for line in lines if not line.startswith("#")]
+    (tmp_path / "one.csv").write_text("\n".join(kept) + "\n")
+    words = ["--robot", "two_link", "--torque", "instantaneous", "--torque-delay", delay, "--no-trials"]
+    assert main(["identify", str(tmp_path / "one.csv"), *words]) == 0
+    printed = capsys.readouterr().out
+    assert re.search(r"without the torque of elbow, .*Ia2, Fv2, Fs2 are not shown", printed)
+    assert "move elbow" not in printed
