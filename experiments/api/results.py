@@ -26,6 +26,7 @@ from idbench.experiments.results.writing import folder_for, write_text
 from idbench.experiments.text import relative
 from idbench.identify import Array, MotionLog, Problem, State, Validation, validate
 from idbench.identify.arrays import combined
+from idbench.identify.files.log_file import read_log
 from idbench.identify.judge.torque_interval import torque_interval
 from idbench.identify.rows.rows import manageable
 from idbench.identify.tables import concise, html_table, text_table
@@ -175,8 +176,8 @@ class Identification:
             raise ExperimentError("predict: the rows of this fit are not kept, its log is too long: intervals are not known")
         return found.half
 
-    def score(self, log: MotionLog, model: str | None = None) -> Score:
-        """Return the errors of the torques predicted for a held-out log.
+    def score(self, log: MotionLog | str | Path, model: str | None = None) -> Score:
+        """Return the errors of the torques predicted for a held-out log, or for that of a file as `read_log` reads it.
 
         Raises
         ------
@@ -184,8 +185,10 @@ class Identification:
             If the log has other joints, or no rows on which torques can be judged.
         """
         robot, estimate = self.robot, self._of(model)
+        if isinstance(log, str | Path):
+            log = read_log(Path(log), self.fit.logs.fitted[0].torque)
         if not isinstance(log, MotionLog):
-            raise ExperimentError(f"score: {log!r:.60} is no log: give a MotionLog, as read_log returns it")
+            raise ExperimentError(f"score: {log!r:.60} is no log: give a file, or a MotionLog as read_log returns it")
         read = given_log("the held-out log", log, robot)
         held_out = (read if self.delay_given else late(read, self.fit.logs.fitted[0].torque)).longest
         if any(within(held_out, other) for other in self.fit.logs.fitted):

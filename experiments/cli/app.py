@@ -123,7 +123,10 @@ def completion(shell: str) -> str:
         every.command(name=name)(typed(options))
     with redirect_stdout(script), suppress(SystemExit):  # the parser ends its process after the script
         every.cli(prog="idbench", args=["--tyro-print-completion", shell])
-    found = script.getvalue().replace("complete -F ", "complete -o default -F ")  # files, where bash has no words
+    # Files, where there are no words: bash completes them by itself if it is given nothing.
+    found = script.getvalue().replace("complete -F ", "complete -o default -F ")
+    found = found.replace('COMPREPLY=($(compgen -f -- "$cur"))', "COMPREPLY=()")
+    found = found.replace('[[ "$completions" ==', '[[ -z "$completions" || "$completions" ==')
     # What an option has without a word is no word of it.
     return re.sub(r"'None', |, 'None'(?=\])", "", found.replace("{None}|", "").replace("{None,", "{"))
 

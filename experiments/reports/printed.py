@@ -1,6 +1,6 @@
 """Identifications as text."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from itertools import zip_longest
 from math import isfinite, log2, pi
 from pathlib import Path
@@ -13,14 +13,11 @@ from rich.text import Text
 from idbench.experiments.identification.causes import words_of_diagnosis
 from idbench.experiments.identification.fit import Fit
 from idbench.experiments.identification.iterations import words_of_iterations
-from idbench.experiments.judgement.held_out import WORDS, HeldOut
-from idbench.experiments.judgement.judgement import Unjudged
 from idbench.experiments.judgement.remedies import NEGLIGIBLE, SURE
 from idbench.experiments.reports.estimates import EstimatesTable, differing, explained
 from idbench.experiments.reports.uncertainty import words_of_uncertainty
-from idbench.experiments.text import error_percentage, new_table, percentage, print_titled
-from idbench.identify import Array, AsLogged, TorqueChannel
-from idbench.identify.judge.torque_interval import LEVEL, MOST
+from idbench.experiments.text import new_table, print_titled
+from idbench.identify import AsLogged, TorqueChannel
 from idbench.identify.tables import concise
 
 ONE_BELOW_THE_OTHER = 16
@@ -212,98 +209,3 @@ def _noise(fit: Fit) -> str:
     each = zip(steps, slides, strict=True)
     bits = " ".join("-" if slide else f"{log2(2 * pi / step):.1f}" if step else "?" for step, slide in each)
     return f"{words}; encoder steps {' '.join(f'{x:.3g}' if x else '?' for x in steps)} {length} ({bits} bits)"
-
-
-def print_held_out(console: Console, one: HeldOut | Unjudged, whole: Sequence[str], *, verbose: bool = False) -> None:
-    """Print how well torques of a held-out log are predicted, and what the simulated robot does on it.
-
-    Parameters
-    ----------
-    console : Console
-        Where to.
-    one : HeldOut or Unjudged
-        The log, and the fit on it.
-    whole : sequence of str
-        Models that are shown.
-    verbose : bool
-        Whether intervals and the verdict on each model are shown, too.
-    """
-    if isinstance(one, Unjudged):
-        console.print(Text(f"not judged on {one.title}: {one.why}\n"), soft_wrap=True)
-        return
-    torques = {model: validation for model, validation in one.torques.items() if model in whole} or one.torques
-    joints = one.fit.robot_model.robot.joints
-    simulated = any(one.position_error(model) is not None for model in torques)
-    torque, position = (
-        ", ".join(dict.fromkeys(each)) for each in zip(*map(one.fit.robot_model.units, range(len(joints))), strict=True)
-    )
-    what = (f"rms [{torque}]", "%", *((f"position [{position}]",) * simulated))
-    heads = [f"{model}\n{each}" if len(torques) > 1 else each for model in torques for each in what]
-    grid, first = new_table("", [*heads, "noise %, at most"]), next(iter(torques.values()))
-    for j, joint in enumerate(joints):
-        noise = percentage(first.percent_of_level(first.noise)[j])
-        cells = (cell for model in torques for cell in _held_out_cells(one, model, j)[: len(what)])
-        grid.add_row(joint, *cells, noise)
-    title = f"torque error{'' if one.log.poses else ' while moving'}{', position error of the simulated robot' * simulated}"
-    print_titled(console, f"{one.title}: {title}", grid)
-    for model in (model for model, v in one.verdicts.items() if model in torques and v.unsimulated):
-        console.print(Text(f"{model}: not simulated: {one.verdicts[model].unsimulated}"), soft_wrap=True)
-    worst = one.verdicts[one.fit.leading].word
-    for model, verdict in one.verdicts.items():
-        if model not in torques and WORDS.index(verdict.word) > WORDS.index(worst):
-            off = error_percentage(float(np.nanmax(one.torques[model].percent)))
-            console.print(Text(f"{model}: {verdict.word}, torque errors of at most {off}"), soft_wrap=True)
-    for words in _details_of(one, first.standing) if verbose else ():
-        console.print(Text(words), soft_wrap=True)
-    console.print()
-
-
-def _details_of(one: HeldOut, standing: Array) -> Iterator[str]:
-    """Yield intervals, errors at rest, and the verdict on each model."""
-    best = one.fit.leading
-    joints = one.fit.robot_model.robot.joints
-    if (within := one.within_interval(best)) is not None and one.fit.torque_intervals[best] is not None:
-        yield _interval_words(one, best, *within)
-    units = (one.fit.robot_model.units(j)[0] for j in range(len(joints)))
-    each = zip(joints, standing, units, strict=True)
-    if apart := [f"{joint} {rms:.2g} {unit}" for joint, rms, unit in each if isfinite(rms)]:
-        yield f"at rest and reversing, where friction is not determined: {', '.join(apart)}"
-    for words, (model, *others) in _alike({model: (v.word, *v.reasons) for model, v in one.verdicts.items()}).items():
-        same = f" ({', '.join(others)}: the same)" if others else ""
-        yield f"{model}: {words[0]}: {'; '.join(words[1:])}{same}"
-    for model, why in one.fit.failures.items():
-        yield f"{model}: not judged: {why}"
-
-
-def _interval_words(one: HeldOut, model: str, inside: Array, outside: float) -> str:
-    """Return how many of a held-out log's torques lie in the fit's intervals, and how much of its motion outside of the fit."""
-    interval, joints = one.fit.torque_intervals[model], one.fit.robot_model.robot.joints
-    assert interval is not None
-    half = " ".join(f"{x:.2g}" if isfinite(x) else "-" for x in interval.half)
-    unit = ", ".join(dict.fromkeys(one.fit.robot_model.units(j)[0] for j in range(len(joints))))
-    share = np.nan_to_num(inside, nan=1.0)
-    worst = f", of {joints[int(share.argmin())]} {100 * share.min():.0f} %" if len(joints) > 1 else ""
-    expected = 2 * (1 - MOST) * len(joints)  # of speeds and torques
-    words = (
-        f"{100 * LEVEL:.0f} % intervals of the torque, +- {half} {unit}: they contain {100 * np.nanmean(inside):.0f} %{worst}"
-    )
-    return (
-        f"{words}; {100 * outside:.0f} % of the motion is outside the fitted speeds and torques"
-        if outside > 2 * expected
-        else words
-    )
-
-
-def _alike(verdicts: Mapping[str, tuple[str, ...]]) -> dict[tuple[str, ...], list[str]]:
-    """Return verdicts with the models that have them."""
-    found: dict[tuple[str, ...], list[str]] = {}
-    for model, words in verdicts.items():
-        found.setdefault(words, []).append(model)
-    return found
-
-
-def _held_out_cells(one: HeldOut, model: str, j: int) -> tuple[str, str, str]:
-    validation, off = one.torques[model], one.position_error(model)
-    if not isfinite(validation.rms[j]):
-        return "", "", ""
-    return f"{validation.rms[j]:.2g}", percentage(validation.percent[j]), "" if off is None else f"{off[j]:.1e}"

@@ -107,6 +107,10 @@ WIDTH = 144
 """Characters of a line where no terminal says how many it has."""
 
 
+NOT_SAVED = "not saved: --out FOLDER keeps it, with a report and a recording"
+"""What is said where nobody named a folder."""
+
+
 @final
 class Page(Console):
     """A console that keeps what is printed until it is shown; what cannot be shown is reported at the end.

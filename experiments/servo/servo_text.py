@@ -107,7 +107,7 @@ def _warnings(fit: ServoFit, mistaken: bool) -> Iterator[str]:
     elif not fit.scaled:
         named = ", ".join(name for name in TORQUES if name in fit.p and name not in fit.known)
         low, high = fit.factor
-        why = "gravity is free as well" if "Mg" in fit.free else "the known load is small beside them"
+        why = "gravity is free as well" if "Mg" in fit.free else "the known load does not set their scale in these logs"
         way = "for torques log more motion, add a known mass to the robot's file, or give one of them (--hold a=0.5)"
         if mistaken:
             why, way = "something is wrong", "mend that first: it is named below"
@@ -187,7 +187,7 @@ def _holds(fit: ServoFit, fitted: Array, held_out: Array | None, moved: float, m
     word = best if share <= GOOD else "fair" if share <= FAIR else "poor"
     if ratio > ALIKE and share > GOOD:
         word = "poor" if share > FAIR else "fair"
-        return f"{word}: the model does not hold on other logs: {off}, {ratio:.2g} times that on the fitted ones"
+        return f"{word}: worse on other logs: {off}, {ratio:.2g} times that on the fitted ones"
     return f"{word}: the model holds on other logs, {off}"
 
 

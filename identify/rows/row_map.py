@@ -27,7 +27,7 @@ class Grid:
         count = (samples - 2 * first) // step
         if count < 1:
             raise LogError(
-                f"{samples} samples ({samples / fs:.4g} s) are too few: this chain drops {first} at either end and makes "
+                f"the log has {samples} samples ({samples / fs:.4g} s); this chain drops {first} at either end and makes "
                 f"a row of {step}, so it needs at least {2 * first + step}: use a longer log, or a chain with a shorter "
                 "memory"
             )

@@ -246,7 +246,8 @@ def test_laws_that_are_objects_are_summed():
         (lambda log: idbench.read_log(None), "is no file"),
         (idbench.fit_payload, "is no file"),
         (lambda log: idbench.table1(motions=3), "unknown key 'motions'"),
-        (lambda log: idbench.fit(log, estimator="OLS").score("log.csv"), "is no log"),
+        (lambda log: idbench.fit(log, estimator="OLS").score("log.csv"), "cannot read the log log.csv"),
+        (lambda log: idbench.fit(log, estimator="OLS").score(3), "is no log"),
         (lambda log: idbench.fit(log, estimator="OLS").predict([0, 0], [0], [0, 0]), "shapes"),
     ],
 )

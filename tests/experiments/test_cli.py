@@ -125,9 +125,9 @@ def test_bash_completes_what_is_typed(tmp_path, capsys):
     assert main(["completion", "bash"]) == 0
     (tmp_path / "idbench.bash").write_text(capsys.readouterr().out)
     code = """source idbench.bash; f=$(complete -p idbench | sed 's/.*-F \\([^ ]*\\).*/\\1/')
-    for words in "idbench ident" "idbench identify --torque-d" "idbench identify --arma"; do
+    for words in "idbench ident" "idbench identify --torque-d" "idbench identify --arma" "idbench identify idb"; do
         COMP_WORDS=($words); COMP_CWORD=$((${#COMP_WORDS[@]} - 1)); COMP_LINE=$words; COMP_POINT=${#words}
-        $f; echo "${COMPREPLY[@]}"
+        $f; echo "${#COMPREPLY[@]} ${COMPREPLY[@]}"
     done"""
     done = subprocess.run(["bash", "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True)
-    assert done.stdout.split() == ["identify", "--torque-delay", "--armature"]
+    assert done.stdout.split() == "1 identify 1 --torque-delay 1 --armature 0".split()

@@ -38,7 +38,7 @@ def test_the_right_signs_are_good(log, tmp_path, capsys):
 
 @pytest.mark.parametrize("delay", ["estimate", "joints", "0"])
 def test_a_torque_that_was_not_logged_hides_what_only_it_shows(log, delay, tmp_path, capsys):
-    """Also where the delay is sought; nobody is told to move the joint more."""
+    """Also where the delay is sought; no advice is to move the joint more."""
     write_log(log, tmp_path / "log.csv")
     lines = (tmp_path / "log.csv").read_text().splitlines()
     kept = [",".join(line.split(",")[:-1]) for line in lines if not line.startswith("#")]

@@ -31,7 +31,8 @@ from idbench.experiments.judgement.judgement import Judgement, judge
 from idbench.experiments.judgement.remedies import checks
 from idbench.experiments.recording.audience import Audience
 from idbench.experiments.reports.estimates import conclusion, models_in_full, verdict_on
-from idbench.experiments.reports.printed import print_fit, print_held_out
+from idbench.experiments.reports.printed import print_fit
+from idbench.experiments.reports.printed_held_out import print_held_out
 from idbench.experiments.results.attempts import Attempts
 from idbench.experiments.results.folder import ResultsFolder
 from idbench.experiments.results.page import Page, new_page, shown, stages_of

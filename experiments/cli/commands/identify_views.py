@@ -16,7 +16,7 @@ from idbench.experiments.judgement.judgement import Judgement
 from idbench.experiments.recording.audience import Audience
 from idbench.experiments.results.attempts import Attempts
 from idbench.experiments.results.folder import RECORDING, ResultsFolder
-from idbench.experiments.results.page import Page
+from idbench.experiments.results.page import NOT_SAVED, Page
 from idbench.experiments.results.writing import Manifest, folder_for, write_text
 
 
@@ -119,6 +119,8 @@ def view_all(shown: Shown, attempts: Attempts) -> None:
     if shown.folder:
         hint = shown.options.watching.hint(shown.folder.out)
         shown.page.print(f"written to {shown.folder.out}{hint}", soft_wrap=True)
+    else:
+        shown.page.print(NOT_SAVED)
     shown.page.show()
 
 

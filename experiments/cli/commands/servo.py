@@ -15,7 +15,7 @@ from idbench.experiments.identification.robot_model import absolute
 from idbench.experiments.recording.audience import Audience
 from idbench.experiments.results.attempts import Attempts
 from idbench.experiments.results.folder import ResultsFolder
-from idbench.experiments.results.page import Page, new_page, shown, stages_of
+from idbench.experiments.results.page import NOT_SAVED, Page, new_page, shown, stages_of
 from idbench.experiments.results.writing import require_free, write_text
 from idbench.experiments.servo.identification import Servos
 from idbench.experiments.servo.job import ServosFit, files_of, servos_identified
@@ -73,6 +73,8 @@ def servo(options: IdentifyServo) -> None:
                 attempts.recording(lambda: _recorded(others or servos, found, audience))
         if folder is not None:
             page.print(f"written to {folder.out}{options.watching.hint(folder.out)}", soft_wrap=True)
+        else:
+            page.print(NOT_SAVED)
 
 
 def _identified(page: Page, folder: ResultsFolder | None, options: IdentifyServo) -> ServosFit:
