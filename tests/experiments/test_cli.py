@@ -130,4 +130,4 @@ def test_bash_completes_what_is_typed(tmp_path, capsys):
         $f; echo "${#COMPREPLY[@]} ${COMPREPLY[@]}"
     done"""
     done = subprocess.run(["bash", "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True)
-    assert done.stdout.split() == "1 identify 1 --torque-delay 1 --armature 0".split()
+    assert done.stdout.split() == ["1", "identify", "1", "--torque-delay", "1", "--armature", "0"]

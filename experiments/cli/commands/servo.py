@@ -107,10 +107,13 @@ def _write(page: Page, options: IdentifyServo, servos: Servos, others: Servos | 
     path = options.write_mjcf
     assert path is not None
     place = path.absolute().parent
-    found = for_mujoco(found)
+    made, found = found, for_mujoco(found)
     text = mjcf_of(servos, found, place, options.position)
     write_text(path, text, "--write-mjcf", force=options.force, read=files_of(options))
     page.print(Text(f"written to {path}: the robot with its servos, to be commanded with angles of the file"), soft_wrap=True)
+    friction = ", ".join(f"{joint} Fs {fit.p['Fs']:.3g} Fv {fit.p['Fv']:.3g}" for joint, fit in found.items() if "Fs" in fit.p)
+    if any(made[joint] is not fit for joint, fit in found.items()):
+        page.print(Text(f"its friction is fitted again as MuJoCo has it: {friction}"), soft_wrap=True)
     page.warn({"the written file": [*inexpressible(found), *without_servo(servos.links.joints, found)]})
     judged = others or servos
     for log in judged.logs:
