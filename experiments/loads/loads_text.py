@@ -48,6 +48,15 @@ def print_payloads(console: Console, found: Mapping[str, PayloadEstimate | str],
         console.print(Text(body["why"]), soft_wrap=True)
 
 
+def words_of_payload(payload: PayloadEstimate) -> str:
+    """Return the mass with its standard error, and where it is, in words."""
+    known = dict(zip(payload.names, zip(payload.X.tolist(), payload.sigma.tolist(), strict=True), strict=True))
+    mass, sigma = known.get("ML", (payload.known.get("ML", np.nan), 0.0))
+    body = body_of(payload)
+    centre = f" at ({', '.join(f'{x:.3f}' for x in body['centre_of_mass'])}) m" if "mass" in body else ""
+    return f"payload of {concise(mass, sigma)} kg{'' if negative_mass(payload) else centre}"
+
+
 def body_of(payload: PayloadEstimate) -> dict[str, Any]:
     """Return mass, centre of mass and inertia of the body that agrees best with an estimate; why, if that is not known."""
     try:

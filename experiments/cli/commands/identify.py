@@ -35,12 +35,9 @@ from idbench.experiments.reports.printed import print_fit
 from idbench.experiments.reports.printed_held_out import print_held_out
 from idbench.experiments.results.attempts import Attempts
 from idbench.experiments.results.folder import ResultsFolder
-from idbench.experiments.results.page import Page, new_page, shown, stages_of
+from idbench.experiments.results.page import COLORS, Page, new_page, shown, stages_of
 from idbench.experiments.results.writing import write_summary
 from idbench.identify.files.log_file import write_log
-
-COLORS = {"good": "green", "fair": "yellow", "poor": "red"}
-"""Of the verdicts."""
 
 ASSUMED = f"no --robot was given, the shipped {SCARA} is assumed"
 

@@ -1,6 +1,7 @@
 """The commands that identify payloads and gains of drives."""
 
-from contextlib import nullcontext
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
 from typing import Any
 
 import numpy as np
@@ -13,11 +14,18 @@ from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.loads.job import GainsFit, PayloadFit, files_of, gains_of, payload_of, simulated_pairs
 from idbench.experiments.loads.known_load import LoadJudgement, negative_mass
-from idbench.experiments.loads.loads_text import body_of, gains_summary, payload_summary, print_gains, print_payloads
+from idbench.experiments.loads.loads_text import (
+    body_of,
+    gains_summary,
+    payload_summary,
+    print_gains,
+    print_payloads,
+    words_of_payload,
+)
 from idbench.experiments.loads.simulated import PairScore
 from idbench.experiments.results.attempts import Attempts
 from idbench.experiments.results.folder import ResultsFolder
-from idbench.experiments.results.page import Page, new_page, progress_of, shown, stages_of
+from idbench.experiments.results.page import COLORS, Page, new_page, progress_of, shown, stages_of
 from idbench.experiments.results.writing import require_free, write_text
 from idbench.experiments.text import new_table, print_titled
 from idbench.identify.loads.payload import PayloadEstimate
@@ -40,7 +48,8 @@ def payload(options: IdentifyPayload) -> None:
             _finish(page, folder)
             return
         made = payload_of(with_own_parts(options))
-        _print_payload(page, options, made)
+        with _headed(page, made.judgement, made.leading, words_of_payload(made.leading)):
+            _print_payload(page, options, made)
         with _finish(page, folder) as attempts:
             _judge(page, made.judgement, made.leading, attempts, folder)
             attempts.file("report.html", lambda: _report(made, command_of("payload", options, "log", NOT_MADE_AGAIN)))
@@ -58,10 +67,27 @@ def gains(options: IdentifyGains) -> None:
             _finish(page, folder)
             return
         made = gains_of(with_own_parts(options))
-        _print_gains(page, options, made)
+        with _headed(page, made.judgement, None, f"gains {' '.join(f'{gain:.4g}' for gain in made.gains)}"):
+            _print_gains(page, options, made)
         with _finish(page, folder) as attempts:
             _judge(page, made.judgement, None, attempts, folder)
             attempts.file("report.html", lambda: _report(made, command_of("gains", options, "log", NOT_MADE_AGAIN)))
+
+
+@contextmanager
+def _headed(page: Page, judgement: LoadJudgement, payload: PayloadEstimate | None, found: str) -> Iterator[None]:
+    """Print the verdict and what was found in one line, then what follows, whatever ends the judging."""
+    try:
+        with stages_of("judging"):
+            word = judgement.word(judgement.warnings(payload))
+        page.print(Text(f"Result: {word}, {found}\n", f"bold {COLORS.get(word, '')}".strip()), soft_wrap=True)
+    except Exception:  # what judges it again, below, says why
+        word = ""
+    except BaseException:
+        yield
+        page.show()
+        raise
+    yield
 
 
 def _report(made: PayloadFit | GainsFit, command: str) -> str:
