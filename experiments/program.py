@@ -11,6 +11,6 @@ def program() -> str:
     beside = Path(sys.prefix).parent / "pyproject.toml"
     try:
         cloned = 'name = "idbench"' in beside.read_text(encoding="utf-8")
-    except OSError:
+    except (OSError, ValueError):  # ValueError: of another project, in another encoding
         cloned = False
     return "uv run idbench" if cloned else "idbench"

@@ -7,6 +7,8 @@ from io import StringIO
 from itertools import groupby
 from math import isnan
 
+import numpy as np
+import numpy.typing as npt
 from rich import box
 from rich.console import Console
 from rich.measure import Measurement
@@ -106,6 +108,16 @@ UNBELIEVED = 1e-15
 
 WORTHLESS = 999.0
 """Percentages from here on all say the same."""
+
+
+def percent_reach(shares: npt.ArrayLike, most: float = np.inf) -> float:
+    """Return how far an axis goes to either side [%] that shows differences in % of values, of those that are below `most`.
+
+    100 % at most, and where nothing is known.
+    """
+    every = np.asarray(shares, dtype=np.float64)
+    known = every[np.isfinite(every) & (every < most)]
+    return float(np.clip(1.1 * known.max(), 0.01, 100.0)) if known.size else 100.0
 
 
 def of_each(said: Iterable[tuple[str, str]]) -> list[str]:

@@ -10,8 +10,8 @@ from numba import njit
 
 
 def compiled(function: Callable[..., Any]) -> Any:
-    """Return a function as compiled code, kept where there is a place for it; what it does to numbers is IEEE 754's."""
-    _remove_stale(Path(function.__code__.co_filename))
+    """Return a function as compiled code, kept where there is a place for it; with the same arithmetic as Python."""
+    _remove_stale(Path(function.__code__.co_filename).parent)
     try:
         return njit(cache=True, nogil=True)(function)
     except RuntimeError:  # neither the project's folder nor a cache of the user can be written
@@ -19,9 +19,13 @@ def compiled(function: Callable[..., Any]) -> Any:
 
 
 @cache
-def _remove_stale(source: Path) -> None:
-    """Remove compiled code that is older than its source: of an earlier version numba cannot even read the index."""
+def _remove_stale(folder: Path) -> None:
+    """Remove compiled code of a folder that is older than any of its sources: what it takes may be defined in another one.
+
+    Of an earlier version numba cannot even read the index.
+    """
     with suppress(OSError):  # a folder that cannot be written: nothing was kept there
-        for path in (source.parent / "__pycache__").glob(f"{source.stem}.*.nb?"):
-            if path.stat().st_mtime < source.stat().st_mtime:
+        newest = max(path.stat().st_mtime for path in folder.glob("*.py"))
+        for path in (folder / "__pycache__").glob("*.nb?"):
+            if path.stat().st_mtime < newest:
                 path.unlink()

@@ -6,12 +6,15 @@
 
   async function size(url) {
     const head = await fetch(url, { method: "HEAD" });
+    if (!head.ok) return 0;
     return Number(head.headers.get("content-length")) || 0;
   }
 
   /* What is read here, the viewer then finds in the browser's cache. */
   async function load(url, received) {
-    const reader = (await fetch(url)).body.getReader();
+    const answer = await fetch(url);
+    if (!answer.ok) throw new Error(`${url}: ${answer.status}`);
+    const reader = answer.body.getReader();
     for (let part = await reader.read(); !part.done; part = await reader.read()) received(part.value.length);
   }
 

@@ -2,7 +2,7 @@
 
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, final
@@ -15,7 +15,7 @@ from idbench.experiments.exports.exports import EXPORTS
 from idbench.experiments.identification.fit import Fit
 from idbench.experiments.identification.job import summary_of
 from idbench.experiments.identification.load import within
-from idbench.experiments.identification.reading import late
+from idbench.experiments.identification.reading import ReadOptions, late, read
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.judgement.held_out import Verdict
 from idbench.experiments.judgement.judgement import Judgement, judge
@@ -26,7 +26,6 @@ from idbench.experiments.results.writing import folder_for, write_text
 from idbench.experiments.text import relative
 from idbench.identify import Array, MotionLog, Problem, State, Validation, validate
 from idbench.identify.arrays import combined
-from idbench.identify.files.log_file import read_log
 from idbench.identify.judge.torque_interval import torque_interval
 from idbench.identify.rows.rows import manageable
 from idbench.identify.tables import concise, html_table, text_table
@@ -186,11 +185,12 @@ class Identification:
         """
         robot, estimate = self.robot, self._of(model)
         if isinstance(log, str | Path):
-            log = read_log(Path(log), self.fit.logs.fitted[0].torque)
+            known = replace(self.fit.logs.fitted[0].torque, gain=1.0)  # as for `held_out`; a gain is of its own file
+            log = read(Path(log), ReadOptions(fallback=known), robot).longest
         if not isinstance(log, MotionLog):
             raise ExperimentError(f"score: {log!r:.60} is no log: give a file, or a MotionLog as read_log returns it")
-        read = given_log("the held-out log", log, robot)
-        held_out = (read if self.delay_given else late(read, self.fit.logs.fitted[0].torque)).longest
+        given = given_log("the held-out log", log, robot)
+        held_out = (given if self.delay_given else late(given, self.fit.logs.fitted[0].torque)).longest
         if any(within(held_out, other) for other in self.fit.logs.fitted):
             raise ExperimentError("score: the log holds the motion that is identified: give another motion")
         problem = Problem((manageable([held_out])[0],), self.fit.basis, self.fit.problem.model, self.fit.processing)

@@ -1,5 +1,6 @@
 """The files that an identification can be written to, and their table."""
 
+import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from importlib.metadata import version
@@ -136,7 +137,7 @@ def _marked(text: str, fit: Fit, model: str) -> str:
     """Return an XML file with a comment that says what it is from, below its declaration."""
     declared = text.index("?>") + 2 if text.startswith("<?xml") else 0
     before, after = text[:declared], text[declared:].lstrip("\n")
-    comment = f"<!-- {_origin(fit, model).replace('--', '- -')} -->\n"  # two hyphens would end it
+    comment = f"<!-- {re.sub(r'-(?=-)', '- ', _origin(fit, model))} -->\n"  # two hyphens would end it
     return f"{before}\n{comment}{after}" if before else comment + after
 
 

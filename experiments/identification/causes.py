@@ -93,6 +93,15 @@ WORDINGS: Mapping[tuple[str, str], Wording] = {
 }
 """Every cause of the table of mistakes, and what it is a mistake of."""
 
+
+def causes_of(
+    suspects: Sequence[Suspect], robot_model: RobotModel, log: MotionLog, gains: Sequence[float] = ()
+) -> tuple["Cause", ...]:
+    """Return mistakes as causes of a robot and its first log; one option mends all torques with the other sign."""
+    turned = tuple(s.joint for s in suspects if (s.cause, s.of) == ("sign", "torque") and s.joint is not None)
+    return tuple(Cause(each, robot_model, log, gains, turned) for each in suspects)
+
+
 LENGTHS = frozenset({"tilt", "axis", "eccentric", "cogging", "base_motion"})
 """Causes of two sizes across each other, whose length is reported."""
 

@@ -6,7 +6,7 @@ from typing import Any, Self, final
 
 import numpy as np
 
-from idbench.experiments.identification.causes import Cause
+from idbench.experiments.identification.causes import Cause, causes_of
 from idbench.experiments.identification.logs import Logs
 from idbench.experiments.identification.rates import CONTROLLER, Rates
 from idbench.experiments.identification.request import Request
@@ -85,9 +85,7 @@ class Fit:
         except (IdentificationError, np.linalg.LinAlgError):  # an estimate is not lost because its tests are
             return None
         log, gains = self.logs.fitted[0], self.logs.gains
-        every = (*self.silent, *suspects)
-        turned = tuple(s.joint for s in every if (s.cause, s.of) == ("sign", "torque") and s.joint is not None)
-        return tuple(Cause(each, self.robot_model, log, gains, turned) for each in every)
+        return causes_of((*self.silent, *suspects), self.robot_model, log, gains)
 
     @cached_property
     def truth(self) -> dict[str, float] | None:

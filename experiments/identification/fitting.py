@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from idbench.experiments.identification.causes import Cause
+from idbench.experiments.identification.causes import causes_of
 from idbench.experiments.identification.fit import Fit
 from idbench.experiments.identification.friction_choice import chosen_in_turns, masked_laws, suited_mask
 from idbench.experiments.identification.logs import Logs
@@ -116,5 +116,5 @@ def _with_its_cause(found: Fit, error: IdentificationError) -> IdentificationErr
         suspects = diagnosed(found.problem, ESTIMATORS.create("GLS").fit(found.problem.explicit).X)
     except (IdentificationError, np.linalg.LinAlgError):
         return error
-    causes = [Cause(each, found.robot_model, found.logs.fitted[0]).advice for each in suspects]
+    causes = [cause.advice for cause in causes_of(suspects, found.robot_model, found.logs.fitted[0])]
     return IdentificationError(f"{error}; with GLS, {'; '.join(causes)}") if causes else error

@@ -25,6 +25,9 @@ from idbench.identify.files.layout import LogLayout
 from idbench.identify.files.reading import LAYOUT_FILE, layout_of, read_columns
 from idbench.identify.judge.delay import DelayEstimate
 
+DELAY_FOUND = "torque delay estimated from the log"
+"""How the note on a delay begins, which those leave out who print it beside the torque."""
+
 LATEST = 1.0
 """Delay [s] that no torque of a log has."""
 
@@ -211,7 +214,8 @@ def _delayed(read: ReadLog, every: Mapping[str, DelayEstimate], unknown: Mapping
         return replace(read, notes=(*read.notes, f"{unknown[meaning]}; {read.channel.delay:g} s is assumed"))
     found = every[meaning]
     logs = tuple(with_delay(log, found) for log in read.logs)
-    return replace(read, logs=logs, channel=found.of(read.channel))
+    notes = (*read.notes, f"{DELAY_FOUND}: {found.words}")
+    return replace(read, logs=logs, channel=found.of(read.channel), notes=notes)
 
 
 def late(read: ReadLog, channel: TorqueChannel) -> ReadLog:

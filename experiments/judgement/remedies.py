@@ -174,8 +174,9 @@ def checks(judgement: Judgement, *, delay: bool, trials: bool = True) -> dict[st
         # Friction absorbs a wrong delay, and the verdict may be good: the log itself is asked.
         found[DELAY] += delay_advice(result) if delay else ()
         found[MODEL] += Remedies(hardest).options() if trials and not judgement.good else ()
-    told = {"delay"} if found[DELAY] else set()
-    found[MODEL] += [cause.advice for cause in result.diagnosis or () if cause.suspect.cause not in told]
+    late = [("delay", "torque", None)] if any("--torque-delay" in advice for advice in found[DELAY]) else []
+    of_model = (c for c in result.diagnosis or () if (c.suspect.cause, c.suspect.of, c.suspect.joint) not in late)
+    found[MODEL] += [cause.advice for cause in of_model]
     return found
 
 

@@ -182,11 +182,15 @@ def hidden_notes(fit: Fit) -> list[str]:
     """Return which parameters the logs do not show, and what would show them."""
     if not fit.hidden:
         return []
-    if absent := never_logged(fit.logs.fitted):
-        names = ", ".join(fit.robot_model.robot.joints[j] for j in absent)
-        return [f"without the torque of {names}, {', '.join(fit.hidden)} are not shown: left out, as if zero"]
-    moves = helpful_moves(fit.robot_model, fit.logs.fitted[0], fit.hidden)
-    return [f"this log does not excite {', '.join(fit.hidden)}: left out, as if zero{f' ({moves})' if moves else ''}"]
+    robot, absent = fit.robot_model, never_logged(fit.logs.fitted)
+    unlogged = {p.name for p in robot.grouping.standard.parameters if p.joint in absent}
+    lost = [name for name in fit.hidden if name in unlogged]
+    still = [name for name in fit.hidden if name not in unlogged]
+    joints = ", ".join(robot.robot.joints[j] for j in absent)
+    notes = [f"without the torque of {joints}, {', '.join(lost)} are not shown: left out, as if zero"] if lost else []
+    moves = helpful_moves(robot, fit.logs.fitted[0], still) if still else ""
+    why = f" ({moves})" if moves else ""
+    return [*notes, *([f"this log does not excite {', '.join(still)}: left out, as if zero{why}"] if still else [])]
 
 
 def warnings_of_robot(robot: Robot) -> list[str]:

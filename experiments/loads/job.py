@@ -235,11 +235,12 @@ def _before(path: Path) -> tuple[tuple[str, ...], Array, Array]:
         names = tuple(str(p["name"]) for p in parameters)
         X, C = np.array([float(p["value"]) for p in parameters]), np.array(content["covariance"], dtype=np.float64)
         if C.shape != (len(names),) * 2 or any(p["column"] is None for p in parameters):
-            raise ValueError("they lack their covariance, or a column")
+            raise ValueError
     except OSError as error:
         raise ExperimentError(f"--before {path}: {error.strerror}") from error
     except (ValueError, KeyError, TypeError, RecursionError) as error:
         raise ExperimentError(
-            f"--before {path} holds no base parameters of an arm: make it by idbench identify ... --write FILE.json"
+            f"--before {path} holds no base parameters of an arm with their covariance: make it by idbench identify ... "
+            "--write FILE.json"
         ) from error
     return names, X, C

@@ -8,7 +8,7 @@ from typing import Any, Self, final
 import numpy as np
 
 from idbench.experiments.errors import ExperimentError
-from idbench.experiments.identification.causes import Cause
+from idbench.experiments.identification.causes import Cause, causes_of
 from idbench.experiments.identification.fitting import fit
 from idbench.experiments.identification.log_warnings import unchanging, unlike_file, warnings_of_log
 from idbench.experiments.identification.logs import Logs
@@ -122,7 +122,7 @@ class LoadJudgement:
             suspects = diagnosed(found.problem, found.X)
         except (IdentificationError, np.linalg.LinAlgError):
             return ()
-        return tuple(Cause(each, robot_model, found.problem.logs[0], self.gain.tolist()) for each in suspects)
+        return causes_of(suspects, robot_model, found.problem.logs[0], self.gain.tolist())
 
     @cached_property
     def verdicts(self) -> dict[str, Verdict]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from collections.abc import Set as AbstractSet
+from math import isnan
 from pathlib import Path
 
 import numpy as np
@@ -102,6 +103,8 @@ def _send_causes(stream: Stream, table: Table2, form: str) -> None:
 
 
 def _emphasized(error_percent: float) -> str:
+    if isnan(error_percent):
+        return ""
     if abs(error_percent) < NOUGHT:
         return "0"
     shown = f"{error_percent:+.2f}" if abs(error_percent) < 100 else f"{error_percent:+.0f}"

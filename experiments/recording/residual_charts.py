@@ -21,7 +21,7 @@ from idbench.experiments.reports.friction_curves import (
     residual_instants,
     spectra,
 )
-from idbench.experiments.text import GREY, JOINTS, SIGMAS, Color, model_color
+from idbench.experiments.text import GREY, JOINTS, SIGMAS, Color, model_color, percent_reach
 from idbench.identify import Array, Estimate, Instants, binned, cutoffs
 
 LINEAR_UP_TO = 1e-3
@@ -54,9 +54,6 @@ def _send(stream: Stream, at: str, estimate: Estimate) -> None:
 MAX_ROWS = 13
 """Parameters of a single chart; more have a chart for each joint."""
 
-WHOLE, LEAST = 100.0, 0.01
-"""How far axes of parameters go at most, and at least [%]."""
-
 ASIDE = 0.22
 """How far the models of a parameter stand apart, of its room."""
 
@@ -69,7 +66,7 @@ def send_parameters(stream: Stream, at: str, fit: Fit, number: int = 0) -> None:
     reach = {form: SIGMAS * estimate.standard_errors / size for form, estimate in fit.estimates.items()}
     unsure = next(iter(reach.values())) > SIGMAS * 100 * WEAK
     for k, (title, members) in enumerate(_parts(fit)):
-        names = [f"{fit.basis.names[p]}{'?' * bool(unsure[p])}" for p in members]
+        names = [f"{fit.basis.names[p]}{' = 0' if reference[p] == 0 else '?' * bool(unsure[p])}" for p in members]
         far = [np.where(unsure, np.nan, np.abs(off[form]) + reach[form])[members] for form in off]
         chart = Chart(stream, f"{at}/parameters/{k:02}/{part(title)}", _scale(fit, far), listed("", names), SQUARE)
         ends = np.array([-0.5, len(members) - 0.5])
@@ -101,9 +98,7 @@ def _reference(fit: Fit) -> Array:
 
 def _scale(fit: Fit, farthest: Sequence[Array]) -> Linear:
     """Return an axis, in % of the values, for parameters that are known; what is beyond its ends lies there."""
-    every = np.concatenate(farthest)
-    high = min(1.1 * float(np.max(every, where=np.isfinite(every), initial=LEAST)), WHOLE)
-    what = "error" if fit.truth else f"difference from {next(iter(fit.estimates))}"
+    high, what = percent_reach(np.concatenate(farthest)), "error" if fit.truth else f"difference from {fit.leading}"
     return Linear(f"{what} [% of the value]; bars: 95 %", -high, high)
 
 

@@ -11,7 +11,7 @@ from idbench.experiments.identification.causes import Cause
 from idbench.experiments.identification.fit import Fit
 from idbench.experiments.judgement.held_out import FAIR, GOOD, Verdict
 from idbench.experiments.judgement.judgement import Judgement
-from idbench.experiments.judgement.warnings import FLAGS, LOG, doubtful, used
+from idbench.experiments.judgement.warnings import DELAY, FLAGS, LOG, doubtful, used
 from idbench.experiments.text import WORTHLESS, error_percentage, number, percent, relative
 from idbench.identify import Estimate
 from idbench.identify.arrays import Array
@@ -144,6 +144,9 @@ def conclusion(judgement: Judgement, warnings: Mapping[str, Sequence[str]]) -> t
     """
     of_log = next((warning for warning in warnings.get(LOG, ()) if "--" in warning), "")
     first = next((found[0] for found in warnings.values() if found), "")
+    late = next((warning for warning in warnings.get(DELAY, ()) if "--torque-delay" in warning), "")
+    if late and (causes := judgement.fit.diagnosis) and causes[0].suspect.cause == "delay":
+        return _found(judgement, causes), "next: --torque-delay estimate"
     return _found(judgement, [] if of_log else judgement.fit.diagnosis or []), _next(judgement, of_log, first)
 
 

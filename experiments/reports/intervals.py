@@ -8,15 +8,12 @@ import numpy as np
 from idbench.experiments.identification.fit import Fit
 from idbench.experiments.judgement.warnings import WEAK, doubtful
 from idbench.experiments.reports.figures import color_of
-from idbench.experiments.text import SIGMAS, relative
+from idbench.experiments.text import SIGMAS, percent_reach, relative
 from idbench.identify.arrays import TINY
 from idbench.identify.tables import concise
 
 WIDE, HIGH = 220.0, 14.0
 """Size of an interval's picture [px]."""
-
-WHOLE, LEAST = 100.0, 0.01
-"""How far the axis of intervals goes at most, and at least [% of the values]."""
 
 ROUNDING = 1e-12
 """Value of a file's parameter that is rounding of 0: those that are grouped are sums of products."""
@@ -47,7 +44,9 @@ class ParameterRow:
 def parameter_rows(fit: Fit) -> Iterator[ParameterRow]:
     """Yield the parameters, by link."""
     lead, marks = fit.estimates[fit.leading], doubtful(fit)[fit.leading]
-    stated, reach = fit.truth or fit.robot_model.truth(fit.robot_model.robot), interval_reach(fit)
+    filed_values = fit.robot_model.truth(fit.robot_model.robot)  # 0 is what files say of what they do not state, too
+    stated = fit.truth or {name: x for name, x in filed_values.items() if abs(x) > ROUNDING}
+    reach = interval_reach(fit)
     made, joints = fit.robot_model.grouping.groupings, fit.robot_model.robot.joints
     for i in fit.basis.without_random_effects:
         parameter = fit.basis.parameters[i]
@@ -58,7 +57,7 @@ def parameter_rows(fit: Fit) -> Iterator[ParameterRow]:
             f"{concise(x, sigma)}{''.join(marks[i]).strip()}",
             parameter.unit,
             relative(x, sigma),
-            "" if filed is None else f"{filed if abs(filed) > ROUNDING else 0.0:.4g}",
+            "" if filed is None else f"{filed:.4g}",
             _interval(fit, i, filed, reach),
             "" if made.get(parameter.name) == parameter.name else made.get(parameter.name, ""),
             joints[parameter.joint] if parameter.joint is not None else "",
@@ -66,11 +65,9 @@ def parameter_rows(fit: Fit) -> Iterator[ParameterRow]:
 
 
 def interval_reach(fit: Fit) -> float:
-    """Return how far the axis of the intervals goes to either side [% of the values]: as parameters need that are known."""
+    """Return how far the axis of the intervals goes to either side [% of the values]."""
     lead = fit.estimates[fit.leading]
-    share = 100 * SIGMAS * lead.standard_errors / np.maximum(np.abs(lead.X), TINY)
-    known = share[np.isfinite(share) & (share < 100 * SIGMAS * WEAK)]
-    return min(1.2 * float(np.max(known, initial=LEAST)), WHOLE)
+    return percent_reach(100 * SIGMAS * lead.standard_errors / np.maximum(np.abs(lead.X), TINY), 100 * SIGMAS * WEAK)
 
 
 def _interval(fit: Fit, i: int, filed: float | None, reach: float) -> str:

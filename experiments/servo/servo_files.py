@@ -3,7 +3,7 @@
 import ast
 import inspect
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from importlib.metadata import version
 from importlib.resources import files
 from pathlib import Path
@@ -59,11 +59,16 @@ EXPRESSIBLE = ("a", "b", "Ia", "Fs", "Fv", "offset", "lag", "lead", "delay", "ra
 """Parameters that a file of MuJoCo has, or that its user adds to commands."""
 
 
+def cannot_express(letters: Iterable[str]) -> list[str]:
+    """Return which parameters a file of MuJoCo has no place for."""
+    lost = dict.fromkeys(x for x in letters if x not in EXPRESSIBLE)
+    meanings = ", ".join(f"{x} ({SERVO_PARAMETERS[x].meaning})" for x in lost)
+    return [f"MuJoCo's dcmotor cannot express {meanings}: what is simulated with the file lacks that"] if lost else []
+
+
 def inexpressible(fits: Mapping[str, ServoFit]) -> list[str]:
     """Return what MuJoCo's servos do not have of what was found."""
-    lost = dict.fromkeys(x for fit in fits.values() for x in fit.free if x not in EXPRESSIBLE)
-    meanings = ", ".join(f"{x} ({SERVO_PARAMETERS[x].meaning})" for x in lost)
-    found = [f"MuJoCo's dcmotor cannot express {meanings}: the errors in plain MuJoCo include that"] if lost else []
+    found = cannot_express(x for fit in fits.values() for x in fit.free)
     if any("backlash" in fit.free for fit in fits.values()):
         found.append("backlash is written as a second joint; the loop of the dcmotor sees the rotor, before the play")
     offsets = {joint: fit.p["offset"] for joint, fit in fits.items()}

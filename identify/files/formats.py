@@ -50,7 +50,7 @@ def require_file(path: Path) -> None:
         raise LogError(f"{path} is {what}: a log is read more than once; write it to a file, such as log.csv, and name that")
 
 
-ROBOTS = (".urdf", ".mjcf", ".xacro")
+ROBOTS = (".urdf", ".mjcf", ".xacro", ".sdf")
 """Endings of files of robots, which are easily given in the place of a log."""
 
 
@@ -65,7 +65,7 @@ def read_table(path: Path) -> LogTable:
     if is_data_set(path):
         path = data_file(path)
     bag = path.is_dir() and (path / "metadata.yaml").is_file()
-    if path.is_dir() and not bag:
+    if path.is_dir() and not bag and not any(path.glob("*.parquet")):
         raise LogError(f"{path} is a folder: give a file in it, such as its log.parquet")
     if path.suffix.lower() in ROBOTS:
         raise LogError(f"{path} is the file of a robot, no log: --robot {path} names it")

@@ -108,8 +108,9 @@ class ServoFile:
             raise SettingError(
                 f"[joints.{wrong[0]}]: the robot has no such joint{did_you_mean(wrong[0], joints)}; it has {', '.join(joints)}"
             )
-        alone = [pattern for pattern in self.logs if not set(pattern) & set("*?[")]  # a pattern may be of logs not given here
-        if wrong := [name for name in alone if name not in logs]:
+        wrong = [pattern for pattern in self.logs if not any(fnmatchcase(log, pattern) for log in logs)]
+        some = len(wrong) < len(self.logs)  # then a pattern without a log is of one that is not given here
+        if wrong := [pattern for pattern in wrong if not (some and set(pattern) & set("*?["))]:
             raise SettingError(f'[logs."{wrong[0]}"]: no log has that name; logs are {", ".join(logs)}')
 
     def robot(self, log: str) -> str | None:

@@ -39,7 +39,7 @@ def standard_layout(path: Path, table: LogTable) -> LogLayout:
         wrong = [f"{what} {', '.join(x)}" for what, x in (("missing:", missing), ("unexpected:", unexpected)) if x]
         raise LogError(
             f"{path} must have a header with the columns {', '.join(needed)}; {'; '.join(wrong)}; its columns: "
-            f"{', '.join(names[:SHOWN])}; or say what they are in a file log.toml beside it: uv run idbench log {path} --write "
+            f"{', '.join(names[:SHOWN])}; or say what they are in a file log.toml beside it: idbench log {path} --write "
             "makes one to start from"
         )
     qd = tuple(f"qd{end}" for end in ends)
@@ -58,5 +58,5 @@ def _require_names(path: Path, table: LogTable) -> None:
     line = ",".join(["t", *(f"{x}{j + 1}" for x in ("q", "tau") for j in range(joints))])
     raise LogError(
         f"{path} has no header, its first line is numbers: put a line of names before it, such as {line}, or say what its "
-        f"columns are in a file log.toml beside it: uv run idbench log {path} --write makes one to start from"
+        f"columns are in a file log.toml beside it: idbench log {path} --write makes one to start from"
     )

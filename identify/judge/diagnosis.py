@@ -8,7 +8,7 @@ import scipy
 
 from idbench.identify.arrays import HELD, TINY, Array
 from idbench.identify.basis.block import Kind
-from idbench.identify.data.motion_log import MotionLog
+from idbench.identify.data.motion_log import MotionLog, never_logged
 from idbench.identify.estimators.problem import Problem
 from idbench.identify.judge.small_mistakes import small_mistakes
 from idbench.identify.judge.suspect import Suspect
@@ -57,13 +57,14 @@ def _with_positive_inertia(problem: Problem, sign: Suspect) -> Iterator[Suspect]
 
     With all torques negative, all parameters are, and residuals are the same.
     """
-    n = problem.basis.n
+    n, absent = problem.basis.n, never_logged(problem.logs)
     turned = np.where(np.arange(n) == sign.joint, -1.0, 1.0)
     flipped = problem.with_logs([replace(log, tau=log.tau * turned) for log in problem.logs])
     fit = flipped.factors.fit(2)
     inertias = _mean_inertias(flipped, fit.X, fit.factor.inverse(np.array(fit.factor.determined)))
-    others = [j for j in range(n) if j != sign.joint and inertias[j]]
-    yield from (replace(sign, joint=j) for j in (others if others and np.sum(inertias) < 0 else [sign.joint]))
+    others = [j for j in range(n) if j != sign.joint and j not in absent]
+    negative = np.sum(np.sign(inertias)) < 0  # most of them
+    yield from (replace(sign, joint=j) for j in (others if others and negative else [sign.joint]))
 
 
 def _impossible_signs(problem: Problem, X: Array) -> Iterator[Suspect]:
@@ -74,15 +75,16 @@ def _impossible_signs(problem: Problem, X: Array) -> Iterator[Suspect]:
     factor = problem.factors.fit(2).factor
     C = factor.inverse(np.array(factor.determined))
     sigma, inertias = np.sqrt(np.diagonal(C)), _mean_inertias(problem, X, C)
+    absent = never_logged(problem.logs)
     of_kind = {(p.kind, p.joint): k for k, p in enumerate(problem.basis.parameters)}
     for j in range(problem.basis.n):
         places = [of_kind.get((kind, j)) for kind in DRIVING]
         t = [0.0 if k is None else float(X[k] / max(sigma[k], TINY)) for k in places]
-        t = [max(t)] if max(t) < inertias[j] else [inertias[j]]
-        if max(t) < -KNOWN:
-            yield Suspect(
-                "sign", "torque", j, (-1.0,), (0.0,), "1", float(scipy.special.ndtr(max(t))), -max(t), (), (0.0, 0.0), 0.0
-            )
+        # A wrong delay takes its share of friction from an inertia, but leaves the friction positive.
+        friction, worst = max(t), min(max(t), float(inertias[j]))
+        if j not in absent and worst < -KNOWN and friction < KNOWN:
+            p = float(scipy.special.ndtr(worst))
+            yield Suspect("sign", "torque", j, (-1.0,), (0.0,), "1", p, -worst, (), (0.0, 0.0), 0.0)
 
 
 def _mean_inertias(problem: Problem, X: Array, C: Array) -> Array:
@@ -90,13 +92,14 @@ def _mean_inertias(problem: Problem, X: Array, C: Array) -> Array:
 
     0 where a joint has none.
     """
-    basis, q = problem.basis, problem.signals[0].state.q
-    q = np.ascontiguousarray(q[..., :: max(1, q.shape[-1] // STATES)])
+    basis, state = problem.basis, problem.signals[0].state
+    some = slice(None, None, max(1, state.q.shape[-1] // STATES))
+    q, conditions = np.ascontiguousarray(state.q[..., some]), {name: x[..., some] for name, x in state.conditions.items()}
     found = np.zeros(basis.n)
     for j in range(basis.n):
         unit = np.zeros_like(q)
         unit[j] = 1.0
-        columns = basis.momentum(State(q, unit, lambda _: np.zeros_like(q)))
+        columns = basis.momentum(State(q, unit, lambda _: np.zeros_like(q), conditions))
         c, held = np.zeros(len(X)), 0.0
         for (row, place), column in columns.items():
             if row == j and place == HELD:

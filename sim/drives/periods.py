@@ -95,7 +95,7 @@ def periods(table: PeriodTable, loops: Loops, windings: Windings, wanted: Array,
                 done[3, k, sim, joint] = steps * table.least
                 if math.isfinite(asked) and math.isfinite(e):
                     i, charge, energy = _passage(table, joint, i, int(steps) + table.highest, e)
-                else:  # of no size, as those who command it will be told
+                else:  # the simulation then fails, and says so
                     i = charge = energy = math.nan
                 electrical += energy
                 done[0, k, sim, joint] = charge

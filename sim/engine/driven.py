@@ -20,8 +20,9 @@ from idbench.sim.robot.robot import Robot
 from idbench.sim.scenario.scenario import Physics
 from idbench.sim.trajectories import Reference
 
-STEP = 0.002
-"""Longest physics step [s]: by RK4, positions of six held joints change by 3e-6 rad of 2e-4 when it is halved."""
+STEP, SHORTEST = 0.002, 0.001
+"""Longest physics step [s], by RK4 (positions of six held joints change by 3e-6 rad of 2e-4 when it is halved), and how short
+one is for joints that friction stops in less."""
 
 Feedback = Callable[[int, Plant], Array]
 """Torque beside that of the log at a sample [N m], shape (joint,)."""
@@ -149,11 +150,17 @@ def _start(
     threads: int = 1,
 ) -> tuple[Plant, Array]:
     """Return robots in states [rad, rad/s], and the torques of a log in every physics step, shape (step, time, joint)."""
-    physics = Physics(step=STEP)
+    physics = Physics(step=float(np.clip(_stopping_time(robot, log.q[:1]), SHORTEST, STEP)))
     h, per_sample = physics_steps(log.fs, physics.step)
     plant = Plant(robot, len(q), physics, h, vary or {}, threads)
     plant.q[:], plant.qd[:] = q, qd
     return plant, np.ascontiguousarray(mean_torques(log, h, per_sample).swapaxes(0, 1))
+
+
+def _stopping_time(robot: Robot, q: Array) -> float:
+    """Return the least time in which viscous friction stops a joint [s], M / Fv."""
+    Fv = robot.model.dof_damping if robot.model.dof_damping.ndim == 1 else robot.model.dof_damping[:, 0]
+    return float(np.min(np.divide(_inertia(robot, q)[0], Fv, out=np.full(robot.n, np.inf), where=Fv > 0)))
 
 
 def _driven(

@@ -112,10 +112,10 @@ def _angles(R: Array) -> Array:
 
 def numbers(values: Array) -> str:
     """Return numbers as such files have them."""
-    return " ".join(repr(float(value)) for value in without_rounding(values))
+    return " ".join(repr(float(value)) for value in without_rounding(values, 1.0))
 
 
-def without_rounding(values: Array) -> Array:
-    """Return values with 0 for what rounding made of it: less than a share of 1e-12 of the largest, or 1e-15 at all."""
+def without_rounding(values: Array, beside: float = 0.0) -> Array:
+    """Return values with 0 for what rounding made of it: less than 1e-15 of the largest, or of what they are sums of."""
     size = np.abs(values)
-    return np.where(size <= max(1e-12 * float(np.max(size, initial=0.0)), 1e-15), 0.0, values)
+    return np.where(size <= 1e-15 * max(float(np.max(size, initial=0.0)), beside), 0.0, values)

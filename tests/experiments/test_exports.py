@@ -5,6 +5,7 @@ import subprocess
 import sys
 import tomllib
 from dataclasses import replace
+from xml.etree import ElementTree
 
 import mujoco
 import numpy as np
@@ -158,6 +159,15 @@ def test_actuators_are_the_robots(found, tmp_path):
     joint = table["joints"]["joint2"]
     np.testing.assert_allclose(joint["damping"], 0.01, atol=4 * joint["damping_sigma"])
     assert json.dumps(table)
+
+
+@pytest.mark.parametrize("ending", [".xml", ".urdf", ".sdf"])
+def test_a_written_robot_says_what_it_is_from(found, ending, tmp_path):
+    """Whatever a log is called: two hyphens would end the comment."""
+    fit = replace(found.fit, logs=replace(found.fit.logs, names=("a---b.csv",)))
+    (text,) = EXPORTS[ending].render(fit, "explicit", tmp_path / f"arm{ending}").texts.values()
+    ElementTree.fromstring(text)
+    assert "identified from a- - -b.csv by GLS of the explicit model" in text
 
 
 def test_what_a_reader_leaves_out_is_named_with_its_size():

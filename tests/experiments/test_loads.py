@@ -226,6 +226,14 @@ def test_a_wrong_gain_of_both_logs_is_no_good_payload_and_is_named(files):
 
 
 @pytest.mark.thorough
+def test_a_torque_with_the_other_sign_is_named_in_both_logs(files):
+    gain = (1.0, 1.0, -1.0, 1.0, 1.0, 1.0)
+    causes = payload_of(asked_of(files, reading=ColumnOptions(gain=gain))).judgement.causes
+    assert [(c.suspect.cause, c.suspect.of, c.suspect.joint) for c in causes[:1]] == [("sign", "torque", 2)]
+    assert causes[0].remedy == "--gain 1 1 1 1 1 1"  # the signs of those that it was read with
+
+
+@pytest.mark.thorough
 def test_the_command_that_shows_the_gains_is_said_in_full(files):
     note = payload_of(asked_of(files)).notes[-1]
     command = note.partition("a payload of known mass shows them: ")[2]

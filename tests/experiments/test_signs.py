@@ -48,3 +48,23 @@ def test_a_torque_that_was_not_logged_hides_what_only_it_shows(log, delay, tmp_p
     printed = capsys.readouterr().out
     assert re.search(r"without the torque of elbow, .*Ia2, Fv2, Fs2 are not shown", printed)
     assert "move elbow" not in printed
+
+
+def test_a_wrong_delay_is_no_sign(tmp_path, capsys):
+    """Of a light joint with much friction: the delay takes Fv times itself from its inertia, its friction stays positive."""
+    robot = """<mujoco><option gravity="0 0 0"/><worldbody><body><joint name="a" axis="0 0 1" damping="0.5" frictionloss="0.4"/>
+      <geom type="capsule" fromto="0 0 0 .3 0 0" size=".03" mass="2"/><body pos=".3 0 0">
+      <joint name="b" axis="0 0 1" damping="0.3" frictionloss="0.3" armature="0.0005"/>
+      <geom type="capsule" fromto="0 0 0 .08 0 0" size=".01" mass=".05"/></body></body></worldbody></mujoco>"""
+    (tmp_path / "arm.xml").write_text(robot)
+    arm = Robot.load(str(tmp_path / "arm.xml"))
+    moves = RandomMoves(moves=14, durations=(0.6, 1.2), velocity=(4.0,), rest=0.1).sample(arm, 200.0)
+    found = ideal_log(arm, moves)
+    noise = 0.002 * found.tau.std(axis=0) * np.random.default_rng(3).standard_normal(found.tau.shape)
+    early = replace(found, q=found.q[2:], tau=(found.tau + noise)[:-2], torque=found.torque)
+    write_log(early, tmp_path / "log.csv")
+    words = ["--robot", str(tmp_path / "arm.xml"), "--torque", "instantaneous", "--torque-delay", "0", "--no-trials"]
+    assert main(["identify", str(tmp_path / "log.csv"), *words]) == 0
+    first, then = capsys.readouterr().out.splitlines()[:2]
+    assert "other sign" not in first
+    assert "--gain" not in then

@@ -8,6 +8,7 @@ from idbench.experiments.identification.robot_model import absolute
 from idbench.experiments.results.page import Page, new_page
 from idbench.experiments.results.writing import require_free, write_text
 from idbench.experiments.servo.device import BENCH, device_of, devices, mjcf_of_device, servo_toml_of
+from idbench.experiments.servo.servo_files import cannot_express
 from idbench.experiments.text import new_table, print_titled
 from idbench.identify.tables import concise
 from idbench.sim.robot.robot import Robot
@@ -40,15 +41,7 @@ def device(options: ShowDevice) -> None:
         text = mjcf_of_device(device_of(options.name), robot, places, options.kp, options.write_mjcf.absolute().parent)
         write_text(options.write_mjcf, text, "--write-mjcf", force=options.force)
         page.print(f"written to {options.write_mjcf}: {options.name} at {', '.join(names[j] for j in places)}", soft_wrap=True)
-        kept = {"a", "b", "Ia", "Fs", "Fv"}  # what a `dcmotor` and its joint have
-        if lost := [name for name in device_of(options.name)["parameters"] if name[:1] == "F" and name not in kept]:
-            page.warn(
-                {
-                    "the written file": [
-                        f"MuJoCo has no place for {', '.join(lost)}: friction that grows with the load is left out"
-                    ]
-                }
-            )
+        page.warn({"the written file": cannot_express(device_of(options.name)["parameters"])})
     if options.write is not None:
         write_text(options.write, servo_toml_of(device_of(options.name)), "--write", force=options.force)
         page.print(f"written to {options.write}: what is known of it, for idbench servo --servo", soft_wrap=True)

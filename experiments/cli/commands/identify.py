@@ -25,6 +25,7 @@ from idbench.experiments.identification.job import (
     summary_of,
 )
 from idbench.experiments.identification.logs import delay_method
+from idbench.experiments.identification.reading import DELAY_FOUND
 from idbench.experiments.identification.request import Request
 from idbench.experiments.identification.robot_model import SCARA
 from idbench.experiments.judgement.judgement import Judgement, judge
@@ -131,7 +132,8 @@ def _followed(stack: ExitStack, options: Identify, request: Request, audience: A
 def _show_fit(page: Page, result: Fit, options: Identify, whole: tuple[str, ...]) -> None:
     """Show the estimates."""
     print_fit(page, result, ", ".join(map(str, options.log)), whole, verbose=options.verbose)
-    for note in (*notes_of(result), *([ASSUMED] if assumes_the_robot(options) else [])):
+    notes = (note for note in notes_of(result) if not note.startswith(DELAY_FOUND))
+    for note in (*notes, *([ASSUMED] if assumes_the_robot(options) else [])):
         page.print(Text(note), soft_wrap=True)
     page.show()
 

@@ -77,16 +77,19 @@ def gains(options: IdentifyGains) -> None:
 @contextmanager
 def _headed(page: Page, judgement: LoadJudgement, payload: PayloadEstimate | None, found: str) -> Iterator[None]:
     """Print the verdict and what was found in one line, then what follows, whatever ends the judging."""
+    head = None
     try:
         with stages_of("judging"):
             word = judgement.word(judgement.warnings(payload))
-        page.print(Text(f"Result: {word}, {found}\n", f"bold {COLORS.get(word, '')}".strip()), soft_wrap=True)
+        head = Text(f"Result: {word}, {found}\n", f"bold {COLORS.get(word, '')}".strip())
     except Exception:  # what judges it again, below, says why
-        word = ""
+        head = None
     except BaseException:
         yield
         page.show()
         raise
+    if head is not None:
+        page.print(head, soft_wrap=True)
     yield
 
 
@@ -125,7 +128,7 @@ def _judge(
     if doubts is None:
         return
     word = judgement.word(doubts)
-    page.print(Text(f"verdict: {word}; how well one robot with one payload explains each log:"), soft_wrap=True)
+    page.print(Text("how well one robot with one payload explains each log:"), soft_wrap=True)
     for name, verdict in judgement.verdicts.items():
         page.print(Text(f"{name}: {verdict.word}: {'; '.join(verdict.reasons)}"), soft_wrap=True)
     page.found |= {"judgement": judgement.summary(word)}
