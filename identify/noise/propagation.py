@@ -14,8 +14,9 @@ from idbench.identify.rows.row_map import Grid, RowMap
 from idbench.identify.signals.filters import CentralDifference, between_samples
 
 RATE, EDGES = 50.0, 200.0
-"""Least frequencies [Hz] at which noise is propagated: rows and motion have little beyond some 10 Hz, edges of masks more. At 100
-Hz sigma of motions that are slow throughout is off by up to 13 %, at 200 Hz by up to 6 %, of others by 2 %."""
+"""Least frequencies [Hz] at which noise is propagated: rows and motion have little beyond some 10 Hz, edges of masks more.
+
+At 100 Hz sigma of motions that are slow throughout is off by up to 13 %, at 200 Hz by up to 6 %, of others by 2 %."""
 
 ALIASED = 0.01
 """Share of a variance by which it may be off for being summed at few samples: 0.5 % of sigma."""
