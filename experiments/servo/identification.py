@@ -23,6 +23,7 @@ from idbench.identify.servo.fit import TORQUES
 from idbench.identify.servo.law import EXACT, KINDS
 from idbench.identify.servo.mistakes import MISTAKES, ServoMistake
 from idbench.identify.servo.parameters import SERVO_PARAMETERS
+from idbench.identify.servo.run import without_spikes
 from idbench.sim.drives import ServoDrive
 from idbench.sim.engine.run import Run
 from idbench.sim.robot.mounting import Mounting
@@ -163,11 +164,12 @@ class Servos:
 
     @property
     def doubts(self) -> list[str]:
-        """What is suspicious about the positions: jumps, degrees, places that a joint cannot reach."""
+        """What is suspicious about the positions, but for spikes, which are left out: jumps, degrees, places out of reach."""
         tree, found = kinematic_tree(self.links), list[str]()
         for path, columns in self.logs.items():
             fs = 1 / float(np.median(np.diff(columns.t)))
-            log = MotionLog(fs, columns.q, np.zeros_like(columns.q), TorqueChannel("instantaneous"))
+            q = np.stack([without_spikes(columns.t, x) for x in columns.q.T], axis=1)
+            log = MotionLog(fs, q, np.zeros_like(q), TorqueChannel("instantaneous"))
             found += [f"{self.name(path)}: {doubt}" for doubt in warnings_of_log(log, tree)]
         return found
 
