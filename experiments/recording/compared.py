@@ -15,6 +15,7 @@ from idbench.experiments.errors import ExperimentError, ResultsError
 from idbench.experiments.recording.columns import part
 from idbench.identify import Array, LogError, MotionLog
 from idbench.identify.files.log_file import read_log
+from idbench.identify.tables import concise
 
 SAME_MOTION = 0.8
 """Correlation of velocities from which on two logs are of the same motion."""
@@ -132,7 +133,7 @@ def estimates(runs: Sequence[Compared]) -> str:
         off = (X[-1] - X[0]) / max(float(np.hypot(sigma[0], sigma[-1])), 1e-300)
         marked = f"**{off:+.1f}**" if abs(off) > CLEAR else f"{off:+.1f}"
         true = f"{truth[name]:g}" if name in truth else ""
-        rows.append(f"| {name} | {true} | {' | '.join(f'{x:.5g}' for x in X)} | {marked} |")
+        rows.append(f"| {name} | {true} | {' | '.join(map(concise, X, sigma))} | {marked} |")
     return "\n".join([*head, *rows])
 
 

@@ -143,7 +143,7 @@ def compare(folders: Sequence[Path], tab: str, out: Path) -> None:
         _copy(stream, run, number, shift or 0.0)
         if number and shift is not None:
             _send_differences(stream, runs[0], run, shift)
-    text = "\n\n".join([*notes, estimates(runs)])
+    text = "\n\n".join([estimates(runs), *notes])
     stream.keep("comparison", rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN))
     stream.keep_sizes()
     stream.arrange(tabs(stream.paths, tab))

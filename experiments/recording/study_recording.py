@@ -150,7 +150,9 @@ class AxisCharts:
         x = np.array([self._place(cell) for cell, *_ in worst])
         y = np.array([PERCENT * abs(error) for _, _, error, _, _ in worst])
         chart.marks("worst", x, y, WORST)
-        chart.write("worst", x, y, [f"run {run}" for *_, run, _ in worst])
+        if worst:  # one label: those of others would lie on it
+            k = int(y.argmax())
+            chart.write("worst", x[k : k + 1], y[k : k + 1], [f"run {worst[k][-2]}"])
         self.stream.keep(f"{path}/marks/worst", rr.AnyValues(commands=[command for *_, command in worst] or ["none"]))
 
 

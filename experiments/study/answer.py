@@ -128,14 +128,12 @@ def _winners(groups: Sequence[Sequence[Cell]], best: Sequence[Cell], cells: Sequ
     words = [f"Least typical error: {' and '.join(winners)}"]
     if len(groups) > 1 or unbeaten < len(groups):
         alone = f" (in {lonely} nothing else gave an estimate)" if lonely else ""
-        words.append(f"not significantly worse than any other in {unbeaten} of {len(groups)} settings{alone}")
+        words.append(f"unbeaten in {unbeaten} of {len(groups)} settings{alone}")
     if len({method(c, cells) for c in cells}) > len(winners):
         sure = sum(set(names) <= set(winners) for names in rivals)
-        words.append(
-            f"significantly less than all others {f'in {sure} ' if len(groups) > 1 else ''}(p < {SURE:g})" if sure else ""
-        )
+        words.append(f"below all others {f'in {sure} ' if len(groups) > 1 else ''}(p < {SURE:g})" if sure else "")
     tied = sum(len(set(names) & set(winners)) > 1 for names in rivals)
-    between = f"between them no significant difference{f' in {tied}' if len(groups) > 1 else ''}" if len(winners) > 1 else ""
+    between = f"equal to each other{f' in {tied}' if len(groups) > 1 else ''}" if len(winners) > 1 else ""
     return ", ".join(filter(None, words)) + (f"; {between}" if between else "")
 
 
