@@ -69,7 +69,7 @@ def delay_advice(result: Fit) -> Iterator[str]:
     except RangeError as error:
         yield f"the delay of the torque is far from the assumed one, or unrelated to this motion: {error}"
         return
-    except IdentificationError:
+    except (IdentificationError, np.linalg.LinAlgError):
         return
     if abs(measured.delay - assumed) <= max(SURE * measured.doubt, NEGLIGIBLE / logs[0].fs):
         return

@@ -175,7 +175,7 @@ def _without_hidden(basis: Basis, error: ExcitationError) -> Basis:
 
 
 def nearby_delay(problem: Problem) -> DelayEstimate:
-    """Return the delay by one step of generalized least squares from the stated one, from rows that are there: of one nearby.
+    """Return the delay by one step of generalized least squares from the stated one, near which it must be.
 
     Parameters
     ----------
