@@ -134,7 +134,7 @@ def test_logs_of_one_name_are_judged_each(payload, idbench, tmp_path):
         logs = f"{loaded}/log.parquet", "--unloaded", f"{unloaded}/log.parquet"
         code, out, err = idbench("payload", *logs, *WAY, "--out", loaded + "-found")
         assert (code, unhurried(err)) == (0, "")
-        assert f"verdict: {word}" in out
+        assert f"Result: {word}" in out
         judged = json.loads((tmp_path / f"{loaded}-found" / "summary.json").read_text())["judgement"]
         assert (judged["verdict"], set(judged["logs"])) == (word, {"full/log.parquet", "empty/log.parquet"})
 
