@@ -161,7 +161,7 @@ class Cause:
         gain = (
             ""
             if not any(self.suspect.held_out)
-            else f"; without it, the error on held-out stretches falls from {before} to {after}"
+            else f"; once mended, the error on held-out stretches falls from {before} to {after}"
         )
         return f"{self.words}{gain}; {'try ' if self.remedy else ''}{self.mends}"
 
