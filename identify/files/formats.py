@@ -68,7 +68,7 @@ def read_table(path: Path) -> LogTable:
     if path.is_dir() and not bag and not any(path.glob("*.parquet")):
         raise LogError(f"{path} is a folder: give a file in it, such as its log.parquet")
     if path.suffix.lower() in ROBOTS:
-        raise LogError(f"{path} is the file of a robot, no log: --robot {path} names it")
+        raise LogError(f"{path} is the file of a robot, no log: give the log here, and the robot (MJCF or URDF) by --robot")
     if not bag and (way_out := FOREIGN.get(kind_of(path))):
         raise LogError(f"idbench reads no {kind_of(path)} ({path}): {way_out}. It reads {', '.join(FORMATS)}")
     reader = read_bag if bag else FORMATS.get(kind_of(path), read_parquet)

@@ -299,3 +299,10 @@ def test_no_pickle_is_loaded(tmp_path):
     np.save(tmp_path / "x.npy", np.array([{"a": 1}], dtype=object), allow_pickle=True)
     with pytest.raises(LogError, match="cannot read the log"):
         read_columns(tmp_path / "x.npy")
+
+
+@pytest.mark.parametrize("name", ["arm.urdf", "arm.XACRO", "arm.sdf"])
+def test_a_robot_in_the_place_of_a_log_is_told_apart(tmp_path, name):
+    (tmp_path / name).write_text("<robot/>")
+    with pytest.raises(LogError, match="the file of a robot, no log: give the log here"):
+        read_table(tmp_path / name)

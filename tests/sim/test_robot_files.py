@@ -9,6 +9,7 @@ import pytest
 from idbench.sim.errors import RobotError
 from idbench.sim.robot.inverse_dynamics import inverse_dynamics
 from idbench.sim.robot.mounting import Mounting, locked
+from idbench.sim.robot.placed import numbers, without_rounding
 from idbench.sim.robot.rewrite import rewritten
 from idbench.sim.robot.robot import Robot
 from idbench.sim.robot.tree import kinematic_tree
@@ -279,3 +280,9 @@ def test_a_part_of_a_file_names_the_file_to_give(load_robot, tmp_path):
     (tmp_path / "scene.xml").write_text('<mujoco><include file="part.xml"/></mujoco>')
     with pytest.raises(RobotError, match=r"a part that another includes: give .*scene\.xml"):
         load_robot("<mujocoinclude><body/></mujocoinclude>", name="part.xml")
+
+
+def test_what_rounding_made_of_zero_is_written_as_zero_and_small_numbers_are_kept():
+    written = numbers(np.array([0.3, 0.1 + 0.2 - 0.3, 1e-9]))
+    assert [float(x) for x in written.split()] == [0.3, 0.0, 1e-9]
+    assert without_rounding(np.array([1e-20, 3e-20])).tolist() == [1e-20, 3e-20]
