@@ -1,4 +1,4 @@
-"""Runs laid over each other: what differs is said first, and a motion that begins later is moved back."""
+"""Runs laid over each other: estimates first, then the settings that differ, and a motion that begins later is moved back."""
 
 import shutil
 
@@ -22,13 +22,13 @@ def folder(tmp_path_factory):
     return at
 
 
-def test_what_differs_stands_first_and_every_run_is_an_identification(folder, reading):
+def test_estimates_stand_first_then_what_differs_and_every_run_is_an_identification(folder, reading):
     one = folder / "both.rrd"
     assert main(["view", str(folder / "ideal"), str(folder / "delay"), "--save", str(one)]) == 0
     reading.verify(one)
     (chunk,) = [c for c in RrdReader(one).stream().filter(content="/comparison").to_chunks() if c.is_static]
     text = chunk.to_record_batch().column("TextDocument:text").to_pylist()[0][0]
-    assert text.index("timing.delay") < text.index("**Estimates**")
+    assert text.index("**Estimates**") < text.index("timing.delay") < text.index("encoder.noise")
     assert "| ideal | delay |" in text
     there = reading.entities(one)
     for name in ("ideal", "delay"):
