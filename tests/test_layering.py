@@ -38,7 +38,6 @@ ALLOWED_IN = {
     "sim/scenario/scenario_file.py": {"tomli_w"},
     "sim/trajectories/recorded.py": {"scipy"},
     "experiments/recording/columns.py": {"pyarrow"},
-    "experiments/recording/scales.py": {"matplotlib"},
     "experiments/recording/comparison_recording.py": {"pyarrow"},
     "experiments/recording/compared.py": {"scipy"},
     "experiments/starters/starters.py": {"jinja2"},

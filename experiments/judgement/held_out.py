@@ -21,7 +21,7 @@ from idbench.identify.basis.block import FRICTION, NOT_NEGATIVE, Parameter
 from idbench.identify.data.motion_log import never_logged
 from idbench.identify.judge.validation import MARGIN
 from idbench.identify.rows.rows import manageable
-from idbench.sim.engine.driven import Replay, replay
+from idbench.sim.engine.driven import Replay, replays
 from idbench.sim.errors import BenchError
 from idbench.sim.robot.robot import Robot
 
@@ -184,11 +184,20 @@ class HeldOut:
     @cached_property
     def replays(self) -> dict[str, Replay | str]:
         """What the robot with each model's parameters does with the torques of the log, or why that is not known."""
-        found = dict[str, Replay | str]()
+        same = dict[str, str]()
         for model in self.fit.estimates:
-            same = next((other for other in found if self._agree(model, other)), None)
-            found[model] = self._replay(model) if same is None else found[same]
-        return found
+            same[model] = next((other for other in same if self._agree(model, other)), model)
+        found, driven = dict[str, Replay | str](), dict[str, tuple[Robot, MotionLog]]()
+        for model in dict.fromkeys(same.values()):
+            try:
+                robot, log, qd = self.driven(model)
+                driven[model] = robot, log
+            except (BenchError, IdentificationError) as error:
+                found[model] = str(error)
+        if driven:
+            robots, logs = zip(*driven.values(), strict=True)
+            found |= dict(zip(driven, replays(robots, logs, qd, BANDWIDTH), strict=True))
+        return {model: found[other] for model, other in same.items()}
 
     def _agree(self, model: str, other: str) -> bool:
         """Return whether the parameters of two models are the same, far within their standard errors."""
@@ -202,13 +211,6 @@ class HeldOut:
             model: Verdict.of(self.fit, validation, self.causes, why if isinstance(why := self.replays[model], str) else "")
             for model, validation in self.torques.items()
         }
-
-    def _replay(self, model: str) -> Replay | str:
-        try:
-            robot, log, qd = self.driven(model)
-            return replay(robot, log, qd, BANDWIDTH)
-        except (BenchError, IdentificationError) as error:
-            return str(error)
 
     def driven(self, model: str) -> tuple[Robot, MotionLog, Array]:
         """Return the robot with a model's parameters, what drives it, and velocities of the log [rad/s].

@@ -3,7 +3,7 @@
 One loop: plants start somewhere in the log, get its torques as its channel says, and what a feedback adds.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import final
 
@@ -39,39 +39,39 @@ class Replay:
     """What the loop adds to the torques of the log to hold it to the log's motion [N m], shape (time, joint)."""
 
 
-def replay(robot: Robot, log: MotionLog, qd: Array, bandwidth: float) -> Replay:
-    """Return what `robot` does with the torques of a log.
+def replays(robots: Sequence[Robot], logs: Sequence[MotionLog], qd: Array, bandwidth: float) -> list[Replay | str]:
+    """Return what robots do with torques, as one batch; of one that runs away, when and how.
 
-    The torques act as the log's channel says; the loop adds M (w^2 e + 2 w de/dt), M the diagonal of the inertia matrix. A
+    The torques act as their log's channel says; the loop adds M (w^2 e + 2 w de/dt), M the diagonal of the inertia matrix. A
     robot with the parameters of the one that was logged needs no feedback, beside noise.
 
     Parameters
     ----------
-    robot : Robot
-        To be simulated.
-    log : MotionLog
-        One run.
+    robots : sequence of Robot
+        To be simulated: one robot with other parameters each.
+    logs : sequence of MotionLog
+        One run, with the torques that each of them gets.
     qd : Array, shape (time, joint)
         Velocities of the log [rad/s].
     bandwidth : float
         Natural frequency w of the loop [rad/s].
-
-    Raises
-    ------
-    ScenarioError
-        If it runs away.
     """
-    kp, feedback = _inertia(robot, log.q) * bandwidth**2, np.empty(log.q.shape)
-    bounds = Bounds(robot, Reference(log.fs, log.q, qd, np.zeros_like(qd)), 1)
+    log, nsim = logs[0], len(robots)
+    reference = Reference(log.fs, log.q, qd, np.zeros_like(qd))
+    kp = np.stack([_inertia(robot, log.q) for robot in robots], axis=1) * bandwidth**2
+    feedback, failed = np.empty(kp.shape), dict[int, str]()
+    bounds = Bounds(robots[0], reference, nsim)
 
     def held(k: int, plant: Plant) -> Array:
-        if broken := {**plant.troubles, **bounds.broken(plant.q, plant.qd)}:
-            raise ScenarioError(f"a robot with these parameters does not follow the log: {broken[0]} after {k / log.fs:.3g} s")
-        feedback[k] = kp[k] * (log.q[k] - plant.q[0] + 2 / bandwidth * (qd[k] - plant.qd[0]))
+        for sim, why in {**plant.troubles, **bounds.broken(plant.q, plant.qd)}.items():
+            failed.setdefault(sim, f"a robot with these parameters does not follow the log: {why} after {k / log.fs:.3g} s")
+            plant.put(log.q[k], np.array([sim]))
+        feedback[k] = kp[k] * (log.q[k] - plant.q + 2 / bandwidth * (qd[k] - plant.qd))
         return feedback[k]
 
-    q, _ = _driven(_start(robot, log, log.q[:1], qd[:1]), np.zeros(1, dtype=np.intp), log.samples, held)
-    return Replay(q[0], feedback)
+    started = _start(robots, logs, np.tile(log.q[0], (nsim, 1)), np.tile(qd[0], (nsim, 1)))
+    q, _ = _driven(started, log.samples * np.arange(nsim), log.samples, held)
+    return [failed.get(sim) or Replay(q[sim], feedback[:, sim]) for sim in range(nsim)]
 
 
 def free_run(robot: Robot, log: MotionLog, qd: Array, length: float) -> tuple[Array, Array]:
@@ -102,7 +102,7 @@ def free_run(robot: Robot, log: MotionLog, qd: Array, length: float) -> tuple[Ar
     if count < 1:
         raise ScenarioError(f"a log of {log.samples / log.fs:.3g} s has no stretch of {length:g} s: use a shorter one")
     first = samples * np.arange(count)
-    simulated, broken = _driven(_start(robot, log, log.q[first], qd[first]), first, samples)
+    simulated, broken = _driven(_start([robot], [log], log.q[first], qd[first]), first, samples)
     simulated[broken] = np.nan
     return log.q[: count * samples].reshape(count, samples, -1), simulated
 
@@ -136,31 +136,47 @@ def shoot(
         Torques beside those of the log [N m].
     """
     beside = None if disturbance is None else lambda k, _: disturbance[:, k]
-    found, broken = _driven(_start(robot, log, *states, vary, 0), np.asarray(first), count, beside)
+    found, broken = _driven(_start([robot], [log], *states, vary, 0), np.asarray(first), count, beside)
     found[broken] = np.nan
     return found
 
 
 def _start(
-    robot: Robot,
-    log: MotionLog,
+    robots: Sequence[Robot],
+    logs: Sequence[MotionLog],
     q: Array,
     qd: Array,
     vary: Mapping[str, npt.ArrayLike] | None = None,
     threads: int = 1,
 ) -> tuple[Plant, Array]:
-    """Return robots in states [rad, rad/s], and the torques of a log in every physics step, shape (step, time, joint)."""
-    physics = Physics(step=float(np.clip(_stopping_time(robot, log.q[:1]), SHORTEST, STEP)))
+    """Return robots in states [rad, rad/s], and the torques of logs, one after another, in every physics step.
+
+    The torques have the shape (step, time, joint).
+    """
+    log = logs[0]
+    physics = physics_of(robots, log.q[:1])
     h, per_sample = physics_steps(log.fs, physics.step)
-    plant = Plant(robot, len(q), physics, h, vary or {}, threads)
+    plant = Plant(robots[0], len(q), physics, h, vary or {}, threads)
     plant.q[:], plant.qd[:] = q, qd
-    return plant, np.ascontiguousarray(mean_torques(log, h, per_sample).swapaxes(0, 1))
+    if len(robots) > 1:
+        plant.become(robots)
+    torques = np.concatenate([mean_torques(one, h, per_sample) for one in logs])
+    return plant, np.ascontiguousarray(torques.swapaxes(0, 1))
 
 
-def _stopping_time(robot: Robot, q: Array) -> float:
-    """Return the least time in which viscous friction stops a joint [s], M / Fv."""
-    Fv = robot.model.dof_damping if robot.model.dof_damping.ndim == 1 else robot.model.dof_damping[:, 0]
-    return float(np.min(np.divide(_inertia(robot, q)[0], Fv, out=np.full(robot.n, np.inf), where=Fv > 0)))
+def physics_of(robots: Sequence[Robot], q: Array) -> Physics:
+    """Return how robots are integrated whose viscous friction stops a joint in M / Fv [s], at q [rad], shape (1, joint).
+
+    RK4 follows it with as long a step, and becomes unstable where a step is 2.8 times as long: what stops sooner than the
+    shortest step is integrated implicitly.
+    """
+    stopping = np.inf
+    for robot in robots:
+        Fv = robot.model.dof_damping if robot.model.dof_damping.ndim == 1 else robot.model.dof_damping[:, 0]
+        times = np.divide(_inertia(robot, q)[0], Fv, out=np.full(robot.n, np.inf), where=Fv > 0)
+        stopping = min(stopping, float(times.min()))
+    step = float(np.clip(stopping, SHORTEST, STEP))
+    return Physics(step) if stopping >= SHORTEST else Physics(step, "implicitfast")
 
 
 def _driven(

@@ -1,6 +1,6 @@
 """The rigid bodies of many simulations, in MuJoCo."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from copy import copy
 from typing import ClassVar
 
@@ -52,20 +52,22 @@ class Plant:
     ) -> None:
         self._begin(robot.model, physics, h, nsim, threads)
         vary_fields(self.batch, vary)
-        self.robots = VariedRobots(robot, nsim, vary) if vary else (robot,) * nsim
+        self.robots: Sequence[Robot] = VariedRobots(robot, nsim, vary) if vary else (robot,) * nsim
         self.q, self.qd, self._applied = (self.batch.bind(name) for name in ("qpos", "qvel", "qfrc_applied"))
         expanded = self.batch.expanded("dof_frictionloss")
         model = robot.model
         self.Fs: Array = np.array(np.broadcast_to(model.dof_frictionloss, (nsim, robot.n)) if expanded is None else expanded)
 
     def _begin(self, described: mujoco.MjModel, physics: Physics, h: float, nsim: int, threads: int) -> None:
-        model = copy(described)
-        model.opt.timestep = h
-        model.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{physics.integrator.upper()}")
-        for flag in SWITCHED_OFF:
-            model.opt.disableflags |= int(flag)
-        self.batch = Batch(model, nsim, threads)
+        self._settings = h, physics.integrator
+        self.batch = Batch(_stepping(described, *self._settings), nsim, threads)
         self._errors: dict[int, str] = {}
+
+    def become(self, robots: Sequence[Robot]) -> None:
+        """Make every simulation that of another robot, which has the same links and joints with other parameters."""
+        self.batch.set_models([_stepping(robot.model, *self._settings) for robot in robots])
+        self.robots = tuple(robots)
+        self.Fs = np.stack([robot.model.dof_frictionloss for robot in robots])
 
     @property
     def joints(self) -> Batch:
@@ -112,3 +114,13 @@ class Plant:
         for sim, kind in np.argwhere(self.batch.warning[..., 1]).tolist():
             found.setdefault(sim, mujoco.mju_warningText(kind, int(self.batch.warning[sim, kind, 0])))
         return found
+
+
+def _stepping(described: mujoco.MjModel, h: float, integrator: str) -> mujoco.MjModel:
+    """Return a robot's model with a physics step [s] and an integrator, driven by torques alone."""
+    model = copy(described)
+    model.opt.timestep = h
+    model.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{integrator.upper()}")
+    for flag in SWITCHED_OFF:
+        model.opt.disableflags |= int(flag)
+    return model

@@ -38,10 +38,11 @@ def test_the_list_of_plugins_loads_neither_scipys_parts_nor_figures(start):
     ("words", "most"),
     [
         (["identify", "log.parquet", "--robot", "puma560", "--no-rerun", "--model", "explicit"], 1400),
+        (["identify", "log.parquet", "--robot", "puma560", "--model", "explicit", "--out", "found"], 1750),
         (["run", "ideal", "--no-rerun"], 1150),
         (["robot", "puma560"], 1020),
     ],
-    ids=lambda words: words[0] if isinstance(words, list) else "",
+    ids=lambda words: " ".join((words[0], *words[6:])) if isinstance(words, list) else "",
 )
 def test_fits_and_runs_load_no_more_than_they_use(start, tmp_path, words, most):
     """SciPy's filters and distributions take half a second, figures a third, numba one; a tenth more than now is the most."""
@@ -53,5 +54,6 @@ def test_fits_and_runs_load_no_more_than_they_use(start, tmp_path, words, most):
     out, err = start("-c", code, cwd=tmp_path).communicate()
     loaded = set(out.splitlines()[-1].split())
     assert "idbench.sim" in loaded, err
-    assert not loaded & {"scipy.signal", "scipy.stats", "matplotlib", "rerun", "numba"}
+    assert not loaded & {"scipy.signal", "scipy.stats", "matplotlib", "numba"}
+    assert ("rerun" in loaded) == ("--out" in words)
     assert len(loaded) < most

@@ -1,11 +1,11 @@
-"""Robots driven by logged torques alone."""
+"""Robots driven by logged torques: alone, or held to the log by a weak loop."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from idbench.sim.engine.driven import free_run
+from idbench.sim.engine.driven import free_run, physics_of, replays
 from idbench.sim.engine.simulation import simulate
 from idbench.sim.errors import ScenarioError
 from idbench.sim.robot.robot import Robot
@@ -41,3 +41,43 @@ def test_another_robot_does_not(log):
 def test_stretches_that_a_log_does_not_have_are_refused(log, length):
     with pytest.raises(ScenarioError, match="stretch"):
         free_run(Robot.load("scara"), log, np.zeros_like(log.q), length)
+
+
+def changed(**fields):
+    robot = Robot.load("scara")
+    for name, values in fields.items():
+        getattr(robot.model, name)[:] = values
+    return robot
+
+
+def test_replays_of_a_batch_are_those_of_each_robot(log):
+    qd = np.gradient(log.q, 1 / log.fs, axis=0)
+    robots = [Robot.load("scara"), changed(dof_damping=0.3), changed(dof_frictionloss=0.0)]
+    logs = [log, log, replace(log, tau=0.9 * log.tau)]
+    together = replays(robots, logs, qd, 5.0)
+    for robot, own, found in zip(robots, logs, together, strict=True):
+        (alone,) = replays([robot], [own], qd, 5.0)
+        np.testing.assert_allclose(found.q, alone.q, rtol=0, atol=1e-12)
+        np.testing.assert_allclose(found.feedback, alone.feedback, rtol=0, atol=1e-10)
+    assert np.abs(together[0].q - log.q).max() < np.abs(together[2].q - log.q).max()
+
+
+def test_a_robot_that_runs_away_leaves_the_others(log):
+    qd = np.gradient(log.q, 1 / log.fs, axis=0)
+    good, none = replays([Robot.load("scara")] * 2, [log, replace(log, tau=log.tau + 1e3)], qd, 5.0)
+    assert np.isfinite(good.q).all()
+    assert "does not follow the log: joint joint2 runs away" in none
+    (same,) = replays([Robot.load("scara")], [log], qd, 5.0)
+    np.testing.assert_allclose(good.q, same.q, rtol=0, atol=1e-12)
+
+
+def test_steps_are_as_short_as_friction_asks_and_stiff_joints_stay_stable(log):
+    q = log.q[:1]
+    slow, quick = physics_of([changed(dof_damping=0.0)], q), physics_of([changed(dof_damping=1e4)], q)
+    assert (slow.step, slow.integrator) == (0.002, "RK4")
+    assert (quick.step, quick.integrator) == (0.001, "implicitfast")
+    middle = physics_of([changed(dof_damping=[0.0, 0.06 / 0.0015])], q)  # ZZ2 = 0.06 kg m^2 of the second joint
+    assert middle.step == pytest.approx(0.0015)
+    assert physics_of([changed(dof_damping=0.0), changed(dof_damping=1e4)], q) == quick
+    (held,) = replays([changed(dof_damping=1e4)], [log], np.gradient(log.q, 1 / log.fs, axis=0), 5.0)
+    assert np.isfinite(held.q).all()

@@ -5,7 +5,7 @@ import pytest
 from rerun.chunk import RrdReader
 
 from idbench.experiments.recording.chart import HEIGHT, WIDE, Chart
-from idbench.experiments.recording.scales import decades, linear, listed, named, signed
+from idbench.experiments.recording.scales import TICKS, decades, linear, listed, named, signed
 from idbench.experiments.recording.stream import Stream
 
 
@@ -81,3 +81,11 @@ def test_a_curve_is_listed_beside_the_frame(drawn):
     assert drawn("legend/curve", "LineStrips2D:labels") == ["curve"]
     assert drawn("legend/curve", "LineStrips2D:strips")[0][0][0] > WIDE
     assert drawn("names", "LineStrips2D:labels") == ["x", "y"]
+
+
+def test_every_axis_has_two_values_at_least_and_has_room_for_them(rng):
+    for _ in range(300):
+        low, far = rng.normal() * 10 ** rng.uniform(-6, 6), 10 ** rng.uniform(-6, 6)
+        assert 2 <= len(linear("x", [low, low + far]).ticks) <= TICKS
+        start = 10 ** rng.uniform(-8, 4)
+        assert 2 <= len(decades("x", [start, start * 10 ** rng.uniform(0.02, 9)]).ticks) <= 8
