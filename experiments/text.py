@@ -5,7 +5,7 @@ from copy import copy
 from dataclasses import replace
 from io import StringIO
 from itertools import groupby
-from math import isnan
+from math import ceil, isnan
 
 import numpy as np
 import numpy.typing as npt
@@ -27,6 +27,15 @@ JOINTS: tuple[Color, ...] = (
     (135, 150, 185),
 )
 """Colours of the joints' curves, none of which is a model's; the first two are those of the SCARA's links."""
+
+TICKS = 6
+"""Values that have room beside an axis."""
+
+NICE = (1.0, 2.0, 2.5, 3.0, 4.0, 5.0, 10.0)
+"""What these are multiples of, times a power of ten."""
+
+ROUNDING = 1e-9
+"""Share of a step by which they are off as numbers."""
 
 SIGMAS = 2.0
 """Half the width of intervals, in standard errors: 95 %."""
@@ -189,6 +198,21 @@ def percent(share: float) -> str:
     if size >= WORTHLESS:
         return f"{'-' if share < 0 else ''}>{WORTHLESS:g}"
     return f"{share:+.0f}" if size >= 100 else f"{share:+.2f}" if size >= 0.01 else f"{share:+.0e}" if size else "0"
+
+
+def round_values(low: float, high: float) -> npt.NDArray[np.float64]:
+    """Return round values between the ends of an axis, `TICKS` at most."""
+    least = (high - low) / (TICKS - 1)
+    power = 10.0 ** np.floor(np.log10(least))
+    step = power * min(x for x in NICE if x * power >= least * (1 - ROUNDING))
+    return np.asarray(step * np.arange(np.ceil(low / step - ROUNDING), np.floor(high / step + ROUNDING) + 1))
+
+
+def powers_of_ten(low: float, high: float) -> npt.NDArray[np.float64]:
+    """Return exponents of powers of ten for a logarithmic axis, `TICKS` between its ends at most, and one below."""
+    powers = np.arange(np.floor(np.log10(low) + ROUNDING), np.floor(np.log10(high) + ROUNDING) + 1)
+    every = max(1, ceil(np.count_nonzero(powers >= np.log10(low) - ROUNDING) / TICKS))
+    return powers[powers % every == 0]
 
 
 def percentage(x: float) -> str:

@@ -67,7 +67,7 @@ def _times(found: Table1Motions, chain: str, letters: str) -> float:
 
 def picture(found: Table1Motions) -> bytes:
     """Return the medians and bands of every error beside the paper's, as a PNG."""
-    figure = Figure(figsize=(12, 4.2), layout="constrained")
+    figure = Figure(figsize=(12, 4.6), layout="constrained")
     axes = figure.subplots(1, len(PAPER), sharey=True)
     for panel, model in zip(axes, PAPER, strict=True):
         at = np.arange(len(found.truth))
@@ -83,8 +83,8 @@ def picture(found: Table1Motions) -> bytes:
         panel.set_title(f"{model} model", loc="left", fontsize=11)
         panel.grid(axis="y", color="0.9")
         panel.spines[["top", "right"]].set_visible(False)
-    axes[0].set_ylabel("error [%]")
-    axes[0].legend(fontsize=8, frameon=False, loc="upper left")
+    axes[0].set_ylabel(f"error [%]: median, and {BAND[0]:g} to {BAND[1]:g} % of the motions")
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper left", ncols=3, frameon=False)
     file = BytesIO()
     figure.savefig(file, format="png", dpi=110)
     return file.getvalue()

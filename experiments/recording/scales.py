@@ -9,23 +9,15 @@ from typing import final
 import numpy as np
 import numpy.typing as npt
 
+from idbench.experiments.text import powers_of_ten, round_values
 from idbench.identify import Array
 from idbench.identify.arrays import TINY
-
-TICKS = 6
-"""Values that have room beside an axis."""
 
 DECADE_STEPS = (1.0,), (1.0, 3.0), (1.0, 2.0, 5.0)
 """Values within a decade that are written beside a logarithmic axis: the first that are more than `ENOUGH`."""
 
 ENOUGH = 2
 """Values beside an axis with which it can be read."""
-
-NICE = (1.0, 2.0, 2.5, 3.0, 4.0, 5.0, 10.0)
-"""What values beside an axis are multiples of, times a power of ten."""
-
-ROUNDING = 1e-9
-"""Share of a step by which values beside an axis are off as numbers."""
 
 ROOM = 0.04
 """Share of an axis that stays free at either end."""
@@ -75,7 +67,7 @@ class Linear(AbstractScale):
         return x
 
     def _values(self) -> Array:
-        return _round_values(self.low, self.high)
+        return round_values(self.low, self.high)
 
 
 @final
@@ -88,12 +80,10 @@ class Decades(AbstractScale):
 
     def _values(self) -> Array:
         for steps in DECADE_STEPS:  # of a short axis, values between the powers of ten, too
-            powers = np.arange(np.floor(np.log10(self.low)), np.floor(np.log10(self.high)) + 1)
-            every = ceil(np.count_nonzero(powers >= np.log10(self.low)) / TICKS) or 1
-            found = np.outer(10.0 ** powers[powers % every == 0], steps).ravel()
+            found = np.outer(10.0 ** powers_of_ten(self.low, self.high), steps).ravel()
             if np.count_nonzero((found >= self.low) & (found <= self.high)) > ENOUGH:
                 return found
-        return _round_values(self.low, self.high)
+        return round_values(self.low, self.high)
 
 
 @final
@@ -157,14 +147,6 @@ def named(name: str, words: Sequence[str]) -> Words:
 def listed(name: str, words: Sequence[str]) -> Words:
     """Return an upright axis of names, the first at the top."""
     return Words(name, len(words) - 0.5, -0.5, tuple(words))
-
-
-def _round_values(low: float, high: float) -> Array:
-    """Return multiples of a `NICE` number times a power of ten, less than `TICKS` intervals of which cover an axis."""
-    least = (high - low) / (TICKS - 1)
-    power = 10.0 ** np.floor(np.log10(least))
-    step = power * min(x for x in NICE if x * power >= least * (1 - ROUNDING))
-    return np.asarray(step * np.arange(np.ceil(low / step - ROUNDING), np.floor(high / step + ROUNDING) + 1))
 
 
 def _ends(values: Sequence[npt.ArrayLike], nothing: float = 0.0) -> tuple[float, float]:

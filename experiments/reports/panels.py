@@ -3,11 +3,11 @@
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from html import escape
-from math import ceil, floor, log10
 from typing import final
 
 import numpy as np
 
+from idbench.experiments.text import ROUNDING, powers_of_ten, round_values
 from idbench.identify import Array
 
 WIDTH = 520.0
@@ -33,9 +33,6 @@ ABOVE = 30.0
 
 FINE = 2
 """Columns of curves for a pixel of a panel, so that a browser can enlarge them: each has its least and its largest sample."""
-
-TICKS = 5
-"""Numbers on an axis, about."""
 
 Scale = Callable[[Array], Array]
 
@@ -77,13 +74,8 @@ class PanelAxis:
         if self.ticks is not None:
             return {x: text for x, text in self.ticks.items() if low <= x <= high}
         if self.log:
-            first, last = ceil(log10(low) - 1e-9), floor(log10(high) + 1e-9)
-            every = max(1, ceil((last - first) / TICKS))
-            return {10.0**k: f"{10.0**k:g}" for k in range(first, last + 1, every)}
-        rough = (high - low) / TICKS
-        size = 10.0 ** floor(log10(rough))
-        step = next(size * k for k in (1, 2, 5, 10) if size * k >= rough)
-        return {step * k: f"{step * k:.6g}" for k in range(ceil(low / step), floor(high / step) + 1)}
+            return {10.0**k: f"{10.0**k:g}" for k in powers_of_ten(low, high).tolist() if 10.0**k >= low * (1 - ROUNDING)}
+        return {x: f"{x:.6g}" for x in round_values(low, high).tolist()}
 
 
 @final

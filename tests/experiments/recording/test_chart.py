@@ -5,8 +5,9 @@ import pytest
 from rerun.chunk import RrdReader
 
 from idbench.experiments.recording.chart import HEIGHT, WIDE, Chart
-from idbench.experiments.recording.scales import TICKS, decades, linear, listed, named, signed
+from idbench.experiments.recording.scales import decades, linear, listed, named, signed
 from idbench.experiments.recording.stream import Stream
+from idbench.experiments.text import TICKS
 
 
 @pytest.mark.parametrize(
