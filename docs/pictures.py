@@ -1,9 +1,10 @@
-"""Make the pictures of recordings in these pages, from scenarios that ship.
+"""Make the pictures in these pages, from scenarios that ship and from kept figures.
 
-    uv run python docs/pictures.py [NAME ...]
+    uv run python docs/pictures.py [NAME ...] [--logs FOLDER]
 
 Every picture is a recording opened in rerun's own viewer, without a window; on a machine without a graphics card that needs a
-software Vulkan driver, such as Debian's mesa-vulkan-drivers. Names are those of PICTURES; all by default.
+software Vulkan driver, such as Debian's mesa-vulkan-drivers. Names are those of CHARTS,
+PAGES, PICTURES and, with a folder of real logs, REAL; all by default.
 """
 
 import os
@@ -14,9 +15,11 @@ import sys
 import tempfile
 import time
 import warnings
+from argparse import ArgumentParser
 from collections.abc import Iterator
 from contextlib import chdir, contextmanager
 from dataclasses import dataclass
+from importlib import import_module
 from io import BytesIO
 from pathlib import Path
 
@@ -102,6 +105,59 @@ PAGES = {
     ),
 }
 """Pages that are photographed, and the commands that write them."""
+
+
+CHARTS = {"conclusion": "conclusion_tables", "benchmark": "benchmark_tables", "estimators": "estimator_tables"}
+"""Pictures that are drawn from the figures in docs/results, and the module of docs/build that draws them."""
+
+
+REAL = {
+    "real-log": ("log train.csv --write --force --picture real-log.png",),
+    "real-report": (
+        "identify train.csv --robot ur10e.urdf --resample --add offset --torque-delay estimate --validate ptp.csv --no-rerun "
+        "--out real-report",
+    ),
+    "friction": (
+        "identify train.csv --robot ur10e.urdf --resample --friction auto --torque-delay estimate --validate ptp.csv "
+        "--no-rerun --out friction",
+    ),
+}
+"""Pictures of the log of docs/real-robots.md, which is not ours: made from a folder with the files of that page."""
+
+SECTIONS = {"friction": "friction"}
+"""Sections of a page, below its title, that are photographed in the place of its beginning."""
+
+
+def real(names: list[str], logs: Path) -> None:
+    """Run what the page of the real robot runs, in a copy of the folder of its files, and photograph it."""
+    for name in names:
+        unread = shutil.ignore_patterns("log.toml" if name == "real-log" else "")  # which the page writes after it
+        with tempfile.TemporaryDirectory(prefix="idbench-") as folder, chdir(folder):
+            shutil.copytree(logs, folder, ignore=unread, dirs_exist_ok=True)
+            for command in REAL[name]:
+                if idbench(command.split()):
+                    sys.exit(f"{command} failed")
+            if Path(f"{name}.png").is_file():
+                shutil.copy(f"{name}.png", DOCS / f"{name}.png")
+            else:
+                page = Path(name) / "report.html"
+                photograph(_section(page, SECTIONS[name]) if name in SECTIONS else page, DOCS / f"{name}.png")
+
+
+def _section(page: Path, name: str) -> Path:
+    """Write title and one section of a page as a page of its own."""
+    text, found = page.read_text(), page.with_name(f"{name}.html")
+    begin = text.index(f'<h2 id="{name}">')
+    found.write_text(text[: text.index("</h1>")] + "</h1>" + text[begin : text.index("<h2", begin + 1)])
+    return found
+
+
+def charts(names: list[str]) -> None:
+    """Draw pictures from kept figures."""
+    sys.path.insert(0, str(DOCS / "build"))
+    for name in names:
+        import_module(CHARTS[name]).picture(DOCS / f"{name}.png")
+        print(f"{name}: drawn from docs/results")
 
 
 def pages(names: list[str]) -> None:
@@ -233,8 +289,17 @@ def viewer(folder: Path) -> Iterator[object]:
 
 
 if __name__ == "__main__":
-    wanted = sys.argv[1:] or [*PICTURES, *PAGES]
-    if unknown := [name for name in wanted if name not in PICTURES and name not in PAGES]:
-        sys.exit(f"no picture {unknown[0]!r}; known: {', '.join((*PICTURES, *PAGES))}")
+    parser = ArgumentParser()
+    parser.add_argument("names", nargs="*")
+    parser.add_argument("--logs", type=Path)
+    asked = parser.parse_args()
+    every = (*CHARTS, *PAGES, *PICTURES, *REAL)
+    wanted = asked.names or list(every[: len(every) - (0 if asked.logs else len(REAL))])
+    if unknown := [name for name in wanted if name not in every]:
+        sys.exit(f"no picture {unknown[0]!r}; known: {', '.join(every)}")
+    if not asked.logs and (without := [name for name in wanted if name in REAL]):
+        sys.exit(f"{without[0]} needs --logs FOLDER, with train.csv, ptp.csv, log.toml and ur10e.urdf of docs/real-robots.md")
+    real([name for name in wanted if name in REAL], asked.logs and asked.logs.absolute())
+    charts([name for name in wanted if name in CHARTS])
     pages([name for name in wanted if name in PAGES])
     make([name for name in wanted if name in PICTURES])

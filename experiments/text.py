@@ -205,7 +205,7 @@ def round_values(low: float, high: float) -> npt.NDArray[np.float64]:
     least = (high - low) / (TICKS - 1)
     power = 10.0 ** np.floor(np.log10(least))
     step = power * min(x for x in NICE if x * power >= least * (1 - ROUNDING))
-    return np.asarray(step * np.arange(np.ceil(low / step - ROUNDING), np.floor(high / step + ROUNDING) + 1))
+    return np.asarray(step * np.arange(np.ceil(low / step - ROUNDING), np.floor(high / step + ROUNDING) + 1) + 0.0)  # no -0
 
 
 def powers_of_ten(low: float, high: float) -> npt.NDArray[np.float64]:

@@ -163,8 +163,10 @@ def picture(place: Path) -> None:
     axes.set_yticks([0.25, 0.5, 1, 2, 5, 10, 20], ["1/4", "1/2", "1", "2", "5", "10", "20"])
     axes.minorticks_off()
     axes.set_xticks(range(len(NOISES)), list(NOISES.values()))
-    axes.set_ylabel("error, over the\nexplicit model's")
-    axes.set_title("Equal numbers of rows: below 1 a model is more accurate than the explicit one", loc="left", fontsize=11)
+    axes.set_ylabel("typical error of a parameter,\nover the explicit model's")
+    axes.set_title(
+        "Below 1 a model is more accurate than the explicit one, from as many rows of the same logs", loc="left", fontsize=11
+    )
     axes.spines[["top", "right"]].set_visible(False)
     axes.grid(axis="y", color="0.9")
     axes.legend(frameon=False, fontsize=8, loc="upper left", bbox_to_anchor=(1, 1))

@@ -2,8 +2,10 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from math import log2
+from pathlib import Path
 from typing import Any
 
+import numpy as np
 from results import Cell, cells, table, typical
 
 NOISES = {"0.0": 0.0, "[0.01, 0.001]": 0.01, "[0.1, 0.01]": 0.1}
@@ -37,6 +39,22 @@ def compared(chain: str) -> Callable[[], Iterator[str]]:
 def compared_in_birdys_shape() -> Iterator[str]:
     """Yield the table of estimators on six joints, over noises of the positions."""
     return _compared(cells("estimators-puma560"), _of_puma, PUMA)
+
+
+PICTURED = {"encoder.lines": 4096.0, "torque.noise": "[0.01, 0.001]"}
+"""Settings of the picture: 14 bits, 0.01 N m."""
+
+
+def picture(place: Path) -> None:
+    """Draw mean and standard deviation of every parameter's error by each estimator, from what is kept of the study."""
+    from idbench.experiments.identification.robot_model import RobotModel
+    from idbench.experiments.study.figures import bars
+
+    found = [c for c in cells("estimators") if c["settings"] == PICTURED and c["chain"] == "idbench"]
+    mean, rms, least = (np.array([c[f"{x}_percent"] for c in found]) for x in ("bias", "rmse", "bound"))
+    runs = np.array([c["runs"] for c in found])[:, None]
+    spread = np.sqrt(np.maximum(rms**2 - mean**2, 0) * runs / (runs - 1))  # of a sample, as the study's report has it
+    bars([c["estimator"] for c in found], RobotModel("scara").basis.names, mean, spread, least).savefig(place, dpi=100)
 
 
 def _compared(found: Sequence[Cell], key_of: Callable[[dict[str, Any]], Key], heads: Mapping[Key, str]) -> Iterator[str]:

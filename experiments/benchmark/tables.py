@@ -200,6 +200,11 @@ def shares(row: Row) -> dict[str, list[float]]:
     return {(OWN if tool.startswith(OWN) else tool): [float(x) for x in e if np.isfinite(x)] for tool, e in every.items()}
 
 
+def shares_of_sets(rows: Sequence[Row]) -> dict[str, dict[str, list[float]]]:
+    """Return the torque errors of each joint over its torque [%], by set and tool, of sets that have torques."""
+    return {row["title"]: shares(row) for row in rows if row_measure(row) is TORQUE}
+
+
 def report(rows: Sequence[Row], failures: Mapping[str, str]) -> str:
     """Return the page of some rows, and why other sets have none."""
     return rendered(
@@ -208,7 +213,7 @@ def report(rows: Sequence[Row], failures: Mapping[str, str]) -> str:
         heads=[head.replace("\n", " ") for head in HEADS],
         overview=list(overview(rows)),
         failures=failures,
-        figure=svg(errors_figure(rows)) if any(row_measure(row) is TORQUE for row in rows) else "",
+        figure=svg(errors_figure(sets)) if (sets := shares_of_sets(rows)) else "",
         sets=[
             {
                 "title": row["title"],
@@ -222,21 +227,21 @@ def report(rows: Sequence[Row], failures: Mapping[str, str]) -> str:
     )
 
 
-def errors_figure(rows: Sequence[Row]) -> Figure:
-    """Return torque errors of every joint [% of its torque], a line a set that has torques, a colour a tool."""
-    rows = [row for row in rows if row_measure(row) is TORQUE]
-    tools = list(dict.fromkeys(tool for row in rows for tool in shares(row)))
-    figure = Figure(figsize=(8, 1.0 + 0.5 * len(rows)), layout="constrained")
+def errors_figure(sets: Mapping[str, Mapping[str, Sequence[float]]]) -> Figure:
+    """Return torque errors of every joint [% of its torque], by set and tool: a line a set, a colour a tool."""
+    tools = list(dict.fromkeys(tool for each in sets.values() for tool in each))
+    figure = Figure(figsize=(8, 1.2 + 0.5 * len(sets)), layout="constrained")
     panel = figure.subplots()
     for k, tool in enumerate(tools):
         height = 0.6 * ((k + 0.5) / len(tools) - 0.5)
-        places = [(share, y + height) for y, row in enumerate(rows) for share in shares(row).get(tool, ())]
+        places = [(share, y + height) for y, each in enumerate(sets.values()) for share in each.get(tool, ())]
         x, y = np.array(places).reshape(-1, 2).T
         color = [c / 255 for c in JOINTS[k % len(JOINTS)]]
         panel.plot(x, y, ".", color=color, label=tool, markersize=7)
-    panel.set_yticks(range(len(rows)), [row["title"] for row in rows], parse_math=False)
+    panel.set_yticks(range(len(sets)), list(sets), parse_math=False)
     panel.invert_yaxis()
     panel.set_xscale("log")
-    panel.set_xlabel("torque error of a joint on held-out logs [% of its torque]")
-    figure.legend(loc="outside upper right", ncols=4, frameon=False)
+    panel.xaxis.set_major_formatter("{x:g}")
+    panel.set_xlabel("torque error on held-out logs [% of the joint's torque]; a dot is a joint, further left is better")
+    figure.legend(loc="outside upper right", ncols=5, frameon=False)
     return figure

@@ -30,6 +30,7 @@ from idbench.experiments.recording.scales import listed, signed
 from idbench.experiments.recording.stream import Stream
 from idbench.experiments.reports.estimates import markdown
 from idbench.experiments.text import FORM_WIDTHS, FORMS, GREY, joint_colors, lighter, model_color
+from idbench.identify import scara
 from idbench.sim.scenario.scenario_file import to_toml
 
 
@@ -75,6 +76,7 @@ def finish_table2(recording: RunRecording, table: Table2) -> list[tuple[str, Str
     described = about(table.scenario.name, table.scenario.origin, ROLES)
     for name, text in (("table2", _markdown(table)), ("about", described)):
         stream.keep(name, rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN))
+    stream.keep_sizes()
     known = set().union(*(s.paths for _, s in streams))
     stream.arrange(tabs(known))
     return streams
@@ -113,11 +115,12 @@ def _emphasized(error_percent: float) -> str:
 
 def _markdown(table: Table2) -> str:
     """Return the explicit and the power model's estimates beside the paper's."""
+    units = [unit.replace("^2", "²") for unit in scara().units]
     lines = ["| | true | | paper | paper's steps | idbench |", "|---|---:|---|---:|---:|---:|"]
     for i, (name, true) in enumerate(table.truth.items()):
         for form in ("explicit", "power"):
             X = [found[form].estimates[form].X[i] for found in table.found.values()]
-            head = f"{name} | {true:g}" if form == "explicit" else " | "
+            head = f"{name} [{units[i]}] | {true:g}" if form == "explicit" else " | "
             lines.append(f"| {head} | {form} | {PAPER[form].estimate[i]:g} | {' | '.join(f'{x:.4g}' for x in X)} |")
     return "\n".join(lines)
 

@@ -9,7 +9,7 @@ import numpy.typing as npt
 from idbench.experiments.identification.fit import Fit
 from idbench.experiments.recording.columns import time_columns
 from idbench.experiments.recording.stream import Stream
-from idbench.experiments.reports.estimates import EstimatesTable, markdown
+from idbench.experiments.reports.estimates import LEAST, EstimatesTable, markdown, models_apart
 from idbench.identify import Array
 
 WHERE = {"friction": "friction", "drive": "friction"}
@@ -25,8 +25,11 @@ def estimates_table(fit: Fit) -> str:
 
 def short_table(fit: Fit) -> str:
     """Return the estimates of the models alone, beside the truth if it is known, as a markdown table."""
-    table, known = EstimatesTable(fit), ["true"] * (fit.truth is not None)
-    found = [f"{markdown(_title(fit), [*known, *fit.estimates], table.short())}", _escaped(table.legend), *_pointers(fit)]
+    models, known = models_apart(fit), ["true"] * (fit.truth is not None)
+    same = [f"{model}: the same to {LEAST:g} sigma" for model in fit.estimates if model not in models]
+    table = EstimatesTable(fit, models)
+    shown = markdown(_title(fit), [*known, *models], table.short())
+    found = [shown, ", ".join(same), _escaped(table.legend), *_pointers(fit)]
     return "\n\n".join(filter(None, found))
 
 

@@ -50,12 +50,12 @@ def table2(shelf: Shelf) -> Part:
         return None
     found = charts(shelf, "error [%], {1}'s steps", "processing/*", NARROW)
     signals = column(
-        plot(shelf, "torque in the log [N m]", "torque/log"),
-        plot(shelf, "torque, true - commanded [N m]", "torque/disturbance"),
+        plot(shelf, "in the log [N m]", "torque/log"),
+        plot(shelf, "true - commanded [N m]", "torque/disturbance"),
     )
-    left = column(side_by_side("twin", arm(shelf), signals, shares=[1, 1]), text(shelf, "table2"), shares=[3, 5])
+    left = column(side_by_side("twin", arm(shelf), signals, shares=[2, 3]), text(shelf, "table2"), shares=[3, 5])
     steps = column(*found)
-    return side_by_side("table2", left, steps, causes, shares=[6, 4, 7])
+    return side_by_side("table2", left, steps, causes, shares=[7, 4, 7])
 
 
 def compare(shelf: Shelf) -> Part:

@@ -25,7 +25,7 @@ from idbench.identify.basis.tree_links import KINDS
 
 DIGITS = "0123456789"
 
-LANES = (0.45, 0.22)
+LANES = (0.5, 0.3)
 """Height of a view of lanes, and of each lane in it, in heights of a plot: all lanes are in sight."""
 
 ESTIMATES = 12
@@ -52,7 +52,7 @@ def overview(shelf: Shelf) -> Part:
     )
     left = column(arm(shelf), text(shelf, "identify/*/estimates") or text(shelf, "about"), shares=[5, 4])
     fits, residual_instants = column(*_fits(shelf, rows)), column(*residuals(shelf))
-    return side_by_side("overview", left, motion, fits, residual_instants, shares=[6, 7, 5, 6])
+    return side_by_side("overview", left, motion, fits, residual_instants, shares=[7, 7, 5, 6])
 
 
 def torques(shelf: Shelf) -> Part:

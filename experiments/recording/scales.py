@@ -19,8 +19,8 @@ DECADE_STEPS = (1.0,), (1.0, 3.0), (1.0, 2.0, 5.0)
 ENOUGH = 2
 """Values beside an axis with which it can be read."""
 
-ROOM = 0.04
-"""Share of an axis that stays free at either end."""
+ROOM, WIDER = 0.04, 2.0
+"""Share of an axis that stays free at either end; how much farther one of decades to both sides reaches than its values."""
 
 
 @dataclass(frozen=True)
@@ -136,7 +136,7 @@ def decades(name: str, *values: npt.ArrayLike) -> Decades:
 def signed(name: str, *values: npt.ArrayLike, bend: float) -> Signed:
     """Return an axis of decades to both sides of 0, as far to one as to the other, that holds all finite values."""
     widest = max(map(abs, _ends(values, bend)))
-    return Signed(name, -1.2 * max(widest, bend), 1.2 * max(widest, bend), bend)
+    return Signed(name, -WIDER * max(widest, bend), WIDER * max(widest, bend), bend)
 
 
 def named(name: str, words: Sequence[str]) -> Words:

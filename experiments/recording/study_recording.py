@@ -152,7 +152,8 @@ class AxisCharts:
         chart.marks("worst", x, y, WORST)
         if worst:  # one label: those of others would lie on it
             k = int(y.argmax())
-            chart.write("worst", x[k : k + 1], y[k : k + 1], [f"run {worst[k][-2]}"])
+            inwards = np.sign((len(self._x.words) - 1) / 2 - x[k : k + 1])  # or it would cover the numbers of the axis
+            chart.write("worst", x[k : k + 1] + inwards, y[k : k + 1], [f"run {worst[k][-2]}"])
         self.stream.keep(f"{path}/marks/worst", rr.AnyValues(commands=[command for *_, command in worst] or ["none"]))
 
 
@@ -161,6 +162,11 @@ _SIGNS: dict[Symbol, str] = {"square": "□", "triangle": "△", "diamond": "◇
 
 EDGES = np.arange(-6.25, 6.3, 0.5)
 """Bins of errors in sigma; what lies beyond counts in the outermost."""
+
+TYPICAL = "*Typical error: geometric mean, over the parameters, of the rms error of all runs.*"
+
+LISTED = 5
+"""Worst runs that have room beside the charts."""
 
 EVERY = 2.0
 """Least time between two drawings for who watches [s]."""
@@ -248,4 +254,4 @@ def _text(study: Study, cells: Sequence[Cell], folder: Path, worst: Sequence[tup
         f"- {name} {100 * e:+.2g} %: {where(cell, cells)}\n  `{command(study, folder, cell, run)}`"
         for cell, name, e, run in worst
     ]
-    return "\n\n".join([f"# {study.question}", answer(cells, study.edges), "## Worst runs", "\n".join(lines)])
+    return "\n\n".join([f"# {study.question}", answer(cells, study.edges), TYPICAL, "## Worst runs", "\n".join(lines[:LISTED])])

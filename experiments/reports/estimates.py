@@ -46,10 +46,11 @@ class EstimatesTable:
             yield [name, self.fit.basis.units[i], *self._true(i), *(cell for cells in each for cell in cells)]
 
     def short(self) -> Iterator[list[str]]:
-        """Yield the truth and the estimates alone, with all marks."""
+        """Yield the truth and the estimates alone, with all marks, units beside the names."""
         for i, name in self._shown:
             each = ((e.X[i], e.standard_errors[i], self._marks[m][i]) for m, e in self.estimates.items())
-            yield [name, *self._true(i), *(f"{concise(x, sigma)}{''.join(marks).strip()}" for x, sigma, marks in each)]
+            head = f"{name} [{self.fit.basis.units[i].replace('^2', '²')}]"
+            yield [head, *self._true(i), *(f"{concise(x, sigma)}{''.join(marks).strip()}" for x, sigma, marks in each)]
 
     def whole(self) -> Iterator[list[str]]:
         """Yield the cells of what is said of each fit as a whole."""
@@ -118,16 +119,23 @@ def models_in_full(fit: Fit, asked: bool) -> tuple[str, ...]:
 
 def differing(fit: Fit, whole: Sequence[str]) -> Iterator[str]:
     """Yield a line on how far the models are from the leading one that are not shown whole."""
-    lead, far = fit.estimates[whole[0]], dict[str, float]()
-    for model, estimate in fit.estimates.items():
-        if model not in whole:
-            sigma = np.maximum(np.hypot(estimate.standard_errors, lead.standard_errors), 1e-300)
-            far[model] = float(np.max(np.abs(estimate.X - lead.X) / sigma))
-    if far:
+    if far := {model: _sigmas_apart(fit, model, whole[0]) for model in fit.estimates if model not in whole}:
         each = ", ".join(
             f"{model} by {f'at most {x:.1g}' if x >= LEAST else 'less than 0.01'} sigma" for model, x in far.items()
         )
         yield f"other models differ: {each} (--model all shows them)"
+
+
+def models_apart(fit: Fit) -> tuple[str, ...]:
+    """Return the leading model, and those that differ from it by what means something."""
+    return tuple(m for m in fit.estimates if m == fit.leading or _sigmas_apart(fit, m, fit.leading) >= LEAST)
+
+
+def _sigmas_apart(fit: Fit, model: str, other: str) -> float:
+    """Return by how many sigma the estimates of two models differ at most."""
+    one, two = fit.estimates[model], fit.estimates[other]
+    sigma = np.maximum(np.hypot(one.standard_errors, two.standard_errors), 1e-300)
+    return float(np.max(np.abs(one.X - two.X) / sigma))
 
 
 def explained(share: Array) -> str:

@@ -71,7 +71,7 @@ def error_figure(cells: Sequence[Cell], axis: Axis) -> str:
         values = 100 * np.array([cell.rmse for cell in cells])
         return matrix_figure(_rows_of(cells, axis), cells[0].parameters, values, "rms error [%]")
     figure, panels = _panels(cells[0].parameters)
-    for p, (name, panel) in enumerate(panels.items()):
+    for p, panel in enumerate(panels.values()):
         for model, group in _models(cells).items():
             x = _places(panel, group, axis)
             color = _color(model)
@@ -83,8 +83,7 @@ def error_figure(cells: Sequence[Cell], axis: Axis) -> str:
             panel.plot(np.array(x)[sure], bias[sure], "o", color=color, ms=3)
         if any((np.asarray(line.get_ydata()) > 0).any() for line in panel.lines):  # a truth of 0 has no relative error
             panel.set_yscale("log")
-        panel.set_title(name)
-    return _finished(figure, panels, axis.field, "error [%]")
+    return svg(_finished(figure, panels, axis.field, "error [%]"))
 
 
 def coverage_figure(cells: Sequence[Cell], axis: Axis) -> str:
@@ -94,7 +93,7 @@ def coverage_figure(cells: Sequence[Cell], axis: Axis) -> str:
         title = f"truth within {SIGMAS:g} sigma [%]"
         return matrix_figure(_rows_of(cells, axis), cells[0].parameters, values, title, log=False)
     figure, panels = _panels(cells[0].parameters)
-    for p, (name, panel) in enumerate(panels.items()):
+    for p, panel in enumerate(panels.values()):
         panel.axhline(100 * RIGHT, color="black", lw=1.0, ls="--")
         for model, group in _models(cells).items():
             x = _places(panel, group, axis)
@@ -108,8 +107,7 @@ def coverage_figure(cells: Sequence[Cell], axis: Axis) -> str:
             paper = [100 * c.coverage(c.paper_sigma)[p] for c in group]
             panel.plot(x, paper, color=color, ls=":", label=f"{model}: paper's", lw=wide)
         panel.set_ylim(-3, 103)
-        panel.set_title(name)
-    return _finished(figure, panels, axis.field, f"truth within {SIGMAS:g} sigma [%]")
+    return svg(_finished(figure, panels, axis.field, f"truth within {SIGMAS:g} sigma [%]"))
 
 
 def matrix_figure(rows: Sequence[str], parameters: Sequence[str], values: Array, title: str, *, log: bool = True) -> str:
@@ -131,33 +129,40 @@ def _rows_of(cells: Sequence[Cell], axis: Axis) -> list[str]:
 
 
 def bars_figure(cells: Sequence[Cell]) -> str:
-    """Return mean and standard deviation of every parameter's error, a bar a method, against the least that noise allows.
+    """Return mean and standard deviation of every parameter's error, a bar a method; of many parameters their rms errors."""
+    names, parameters = [_name(cell, cells) for cell in cells], cells[0].parameters
+    if len(parameters) > MANY:
+        return matrix_figure(names, parameters, 100 * np.array([cell.rmse for cell in cells]), "rms error [%]")
+    numbers = ([cell.bias for cell in cells], [cell.deviation for cell in cells], [cell.least() for cell in cells])
+    return svg(bars(names, parameters, *(100 * np.array(x) for x in numbers)))
 
-    A panel reaches as far as four times the median of the bars; what is beyond points there. Many parameters are one picture
-    of their rms errors.
+
+def bars(names: Sequence[str], parameters: Sequence[str], mean: Array, spread: Array, least: Array) -> Figure:
+    """Return mean and standard deviation of errors [%], shape (method, parameter), against the least that noise allows.
+
+    A panel reaches as far as four times the median of the bars; what is beyond points there.
     """
-    if len(cells[0].parameters) > MANY:
-        rows = [_name(cell, cells) for cell in cells]
-        return matrix_figure(rows, cells[0].parameters, 100 * np.array([cell.rmse for cell in cells]), "rms error [%]")
-    figure, panels = _panels(cells[0].parameters, below=1.1, gap=0.65)
-    for p, (name, panel) in enumerate(panels.items()):
-        mean = 100 * np.array([cell.bias[p] for cell in cells])
-        spread = np.nan_to_num(100 * np.array([cell.deviation[p] for cell in cells]))
-        least = np.array([100 * cell.least()[p] for cell in cells])
-        sizes = (np.abs(mean) + spread)[np.isfinite(mean)]
+    figure, panels = _panels(parameters, below=1.1, gap=0.65)
+    at, spread = np.arange(len(names)), np.nan_to_num(spread)
+    for p, panel in enumerate(panels.values()):
+        sizes = (np.abs(mean[:, p]) + spread[:, p])[np.isfinite(mean[:, p])]
         limit = REACH * float(np.median(sizes)) if len(sizes) and np.median(sizes) > 0 else 1.0
         panel.axhline(0.0, color="black", lw=0.6)
-        if np.isfinite(least).any():
-            panel.axhspan(-np.nanmean(least), np.nanmean(least), color="0.8", lw=0, label="bound")
-        at = np.arange(len(cells))
-        inside = np.abs(mean) < limit
-        bars = at[inside], mean[inside], spread[inside]
-        panel.errorbar(*bars, fmt="o", ms=3, lw=1.2, capsize=2, color="#5b7db1", label="error")
-        panel.plot(at[~inside], np.sign(mean[~inside]) * 0.95 * limit, "v", ms=4, color="#b15b5b", label="beyond")
+        if np.isfinite(least[:, p]).any():
+            bound = float(np.nanmean(least[:, p]))
+            panel.axhspan(-bound, bound, color="0.8", lw=0, label="least standard deviation that noise allows (bound)")
+        inside = np.abs(mean[:, p]) < limit
+        shown = at[inside], mean[inside, p], spread[inside, p]
+        panel.errorbar(
+            *shown, fmt="o", ms=3, lw=1.2, capsize=2, color="#5b7db1", label="mean error, and its standard deviation"
+        )
+        for x, y in zip(at[~inside], mean[~inside, p], strict=True):
+            high = 0.93 * limit * np.sign(y)
+            panel.plot(x, high, "^" if y > 0 else "v", ms=4, color="#b15b5b", label="beyond the axis, with its value")
+            panel.text(x, 0.8 * high, f"{y:.2g}", fontsize=6, color="#b15b5b", va="center", ha="center")
         panel.set_ylim(-limit, limit)
-        panel.set_xticks(at, [_name(cell, cells) for cell in cells], rotation=90, fontsize=6)
+        panel.set_xticks(at, names, rotation=90, fontsize=6)
         panel.tick_params(labelbottom=True)
-        panel.set_title(name)
     return _finished(figure, panels, "", "error [%]")
 
 
@@ -238,9 +243,13 @@ def _color(model: str) -> tuple[float, ...]:
     return tuple(c / 255 for c in FORMS.get(model, OTHER))
 
 
-def _finished(figure: Figure, panels: dict[str, Panel], axis: str, y: str) -> str:
-    handles, labels = next(iter(panels.values())).get_legend_handles_labels()
-    figure.legend(handles, labels, loc="upper center", ncols=6, frameon=False)
+def _finished(figure: Figure, panels: dict[str, Panel], axis: str, y: str) -> Figure:
+    """Return a figure of panels with one legend."""
+    every = [panel.get_legend_handles_labels() for panel in panels.values()]
+    named = {label: handle for panel in every for handle, label in zip(*panel, strict=True)}
+    for name, panel in panels.items():
+        panel.set_title(name)
+    figure.legend(named.values(), named.keys(), loc="upper center", ncols=6, frameon=False)
     figure.supylabel(y, fontsize=9, x=0.005)
     figure.supxlabel(axis, fontsize=9)
-    return svg(figure)
+    return figure

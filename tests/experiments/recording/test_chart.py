@@ -32,7 +32,7 @@ def test_ticks_are_round_and_decades_are_powers_of_ten():
     assert list(linear("x", [-1.93, 2.1]).ticks) == [-2.0, -1.0, 0.0, 1.0, 2.0]
     assert list(decades("x", [3e-5, 2.3]).ticks.values()) == ["0.0001", "0.001", "0.01", "0.1", "1"]
     assert list(decades("x", [0.7, 1.9]).ticks.values()) == ["0.9", "1.2", "1.5", "1.8"]  # less than a decade: steps
-    assert set(signed("x", [50.0], bend=0.01).ticks.values()) == {"-10", "-0.1", "0", "0.1", "10"}
+    assert set(signed("x", [50.0], bend=0.01).ticks.values()) == {"-100", "-1", "0", "1", "100"}
 
 
 @pytest.mark.parametrize("values", [[], [np.nan, np.inf], [0.0], [5.0, 5.0]])
