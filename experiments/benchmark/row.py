@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict
 from functools import partial
 from importlib.metadata import version
 from itertools import combinations
@@ -132,7 +133,7 @@ def row_of(made: SetFit, predicted: Mapping[str, Path]) -> dict[str, Any]:
         "estimate": _estimate(fit),
         "seconds": made.seconds,
         "logs": _logs(judgement.on, made),
-        "published": definition.published,
+        "published": [asdict(one) for one in definition.published],
         "notes": list(fit.logs.notes),
     }
     row["verdict"] = _worst([log["verdict"] for log in row["logs"] if "verdict" in log])

@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Mapping
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -40,7 +41,7 @@ def servo_row(folder: Path, definition: Definition, out: Path) -> Made:
         "estimate": {joint: summary_of(fit) for joint, fit in fits.items()},
         "seconds": seconds,
         "logs": _logs(others, made.errors["held out"], servos.links.joints),
-        "published": definition.published,
+        "published": [asdict(one) for one in definition.published],
         "notes": [f"{joint}: {why}" for joint, why in made.every.items() if isinstance(why, str)],
         "verdict": None,
         "verdicts": made.verdicts,

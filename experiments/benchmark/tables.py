@@ -152,8 +152,18 @@ def remarks(row: Row) -> Iterator[str]:
         yield from (f"{tool}: {part['failure']}" for part in (found, *found.get("logs", ())) if "failure" in part)
     yield from row.get("verdicts", ())
     yield from [f"not saved: {row['unsaved']}"] if "unsaved" in row else []
-    if row["published"]:
-        yield f"published: {row['published']}"
+    yield from (beside_published(row, one) for one in row["published"])
+
+
+def beside_published(row: Row, published: Row) -> str:
+    """Return a published figure beside the row's own by the same metric."""
+    ours, unit = METRICS[published["metric"]]
+    own = ours(row)
+    mine = f"{own:.3g}{unit}" if np.isfinite(own) else "not known"
+    return (
+        f"{published['metric']}: {OWN} {mine} on the held-out logs of this set; published {published['value']:g}{unit} "
+        f"({published['by']}: {published['split']})"
+    )
 
 
 def _tools(row: Row) -> Iterator[tuple[str, Sequence[Row], float | None]]:
@@ -178,6 +188,14 @@ def worst_R2(row: Row) -> Array:
 def free_run(row: Row) -> float:
     """Return the NRMSE of free runs of the median joint, rms over logs; NaN if there is none."""
     return _median(pooled(row.get("free_run", ()), "nrmse"))
+
+
+METRICS: Mapping[str, tuple[Callable[[Row], float], str]] = {
+    "torque error": (lambda row: _median(share(row, row["logs"])), " %"),
+    "position error": (lambda row: _median(pooled(row["logs"], POSITION.name, mean)), " rad"),
+    "free run": (free_run, " (NRMSE)"),
+}
+"""Figures of a row that others publish, and their units."""
 
 
 def _median(x: Array) -> float:

@@ -45,6 +45,19 @@ def test_a_set_becomes_a_row_and_is_kept(scara_set, tmp_path, capfd, monkeypatch
     assert row_of(tmp_path / "found")["title"] == "Another"
 
 
+def test_published_figures_stand_beside_the_own_one_by_the_same_metric(scara_set, tmp_path, capfd, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    figure = 'published = [{value = 7.5, metric = "torque error", split = "all of it fitted", by = "A. Body"}]\n'
+    text = (scara_set / "benchmark.toml").read_text()
+    (scara_set / "benchmark.toml").write_text(figure + text)
+    assert main(["benchmark", "arm", "--out", "found"]) == 0
+    row = row_of(tmp_path / "found")
+    own = np.median(share(row, row["logs"]))
+    said = f"torque error: idbench {own:.3g} % on the held-out logs of this set; published 7.5 % (A. Body: all of it fitted)"
+    assert said in capfd.readouterr().out
+    assert said in (tmp_path / "found" / "report.html").read_text()
+
+
 def test_torques_of_other_tools_are_judged_on_the_same_rows(scara_set, scara_logs, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert main(["benchmark", "arm", "--out", "found"]) == 0
@@ -150,6 +163,8 @@ def test_samples_are_counted_before_they_are_resampled(scara_set, scara_logs, tm
         ('held_out = ["gone.csv"]\nget = "ask them"', "gone.csv; get the data with: ask them"),
         ("free_run = -1.0", "free_run"),
         ("title = 3", "title"),
+        ('published = "0.1 rad"', "published"),
+        ('published = [{value = 1.0, metric = "R2", split = "", by = ""}]', "metric = 'R2': must be 'torque error'"),
     ],
 )
 def test_wrong_definitions_are_refused_by_name(scara_set, tmp_path, monkeypatch, capfd, change, words):
