@@ -9,11 +9,10 @@ from typing import final
 import numpy as np
 
 from idbench.experiments.errors import ExperimentError
-from idbench.experiments.identification.log_warnings import without_shapes
 from idbench.experiments.identification.reading import ReadLog
 from idbench.experiments.identification.request import Request
 from idbench.experiments.identification.robot_model import RobotModel
-from idbench.identify import Array, CentralDifference, ExplicitModel, IdentificationError, MotionLog, Problem
+from idbench.identify import Array, CentralDifference, ExplicitModel, IdentificationError, MotionLog, instants
 from idbench.identify.rows.rows import is_long
 from idbench.identify.signals.filters import REACH, shift
 from idbench.sim.robot.time_steps import apparent_rotor_inertia, integrator_name, torque_of_steps
@@ -87,10 +86,10 @@ class SimulatedLogs:
 
     def _left(self, logs: Sequence[MotionLog], request: Request) -> Array:
         """Return what the file's parameters leave of the torques, shape (joint,)."""
-        problem = Problem(tuple(logs), self.robot_model.plain.basis, ExplicitModel(), request.processing)
-        filed = np.array(list(self.robot_model.plain.truth(self.robot_model.robot).values()))
-        R = without_shapes(problem)
-        return np.asarray(np.linalg.norm(R[..., :-1] @ filed - R[..., -1], axis=-1))
+        plain, chain = self.robot_model.plain, request.processing
+        filed = np.array(list(plain.truth(self.robot_model.robot).values()))
+        each = (instants(chain.signals(log), plain.basis, ExplicitModel(), chain, filed).in_rows(chain) for log in logs)
+        return np.asarray(np.linalg.norm(np.concatenate(list(each), axis=-1), axis=-1))
 
     def _words(self, read: ReadLog) -> str:
         robot = self.robot_model.robot

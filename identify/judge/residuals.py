@@ -96,6 +96,11 @@ class Instants:
         """Weights of the mask there, shape (row, time)."""
         return self.equations.weight[..., self.inner]
 
+    def in_rows(self, chain: Chain) -> Array:
+        """Return what the rows of a chain make of them, Y - W X by kind, without their W, shape (kind, instant)."""
+        to_rows = chain.operator.map(self.equations, self.equations.weight, chain.grid(self.equations.signals.log))
+        return to_rows.kernel.apply(to_rows.inside * self.everywhere) * to_rows.outside
+
 
 def instants(signals: Signals, basis: Basis, model: AbstractModel, chain: Chain, X: Array) -> Instants:
     """Return what `model` with the parameters `X` leaves unexplained at every sample of one log.

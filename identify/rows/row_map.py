@@ -81,14 +81,15 @@ def windowed(x: Array, weights: Array, before: int, grid: Grid) -> Array:
     stretch = x[..., start : start + length]
     if stretch.shape[-1] < length:  # beyond the last row's weights, where the parts are zero
         stretch = np.pad(stretch, [(0, 0)] * (x.ndim - 1) + [(0, length - stretch.shape[-1])])
-    cut = np.swapaxes(stretch.reshape(*x.shape[:-1], frames, step), -1, -2).reshape(*x.shape[:-2], -1, frames)
+    framed = np.swapaxes(stretch.reshape(*x.shape[:-1], frames, step), -2, -3).reshape(*x.shape[:-2], frames, -1)
     padded = np.zeros((*weights.shape[:2], parts * step))
     padded[..., : weights.shape[-1]] = weights
     split = np.swapaxes(padded.reshape(sums, -1, parts, step), 1, 2).reshape(sums * parts, -1)
-    products = np.matmul(split, cut).reshape(*x.shape[:-2], sums, parts, frames)
-    total = products[..., 0, :count].copy()
-    for i in range(1, parts):
-        total += products[..., i, i : i + count]
+    used = np.flatnonzero(split.any(axis=-1))  # windows of rows at different lags overlap in part
+    products = np.matmul(split[used], np.swapaxes(framed, -1, -2))
+    total = np.zeros((*x.shape[:-2], sums, count))
+    for k, (which, part) in enumerate(zip(*np.divmod(used, parts), strict=True)):
+        total[..., which, :] += products[..., k, part : part + count]
     return total
 
 
