@@ -26,7 +26,7 @@ TAKEN = ("log", "validate", "label")
 
 
 @settings
-class Published:
+class PublishedFigure:
     """A figure that others have published for the data of a set."""
 
     value: NotNegative
@@ -66,7 +66,7 @@ class Definition:
     """Licence of the data."""
     get: str = ""
     """How to get the data: commands, to be run in the folder."""
-    published: tuple[Published, ...] = ()
+    published: tuple[PublishedFigure, ...] = ()
     """Figures that others have published for these data."""
 
     def __post_init__(self) -> None:

@@ -119,12 +119,19 @@ class NormalEquations:
         speed = np.einsum("ks,ksj->sj", hermite(place, cells.period)[1], ends)
         self.corner[-1, -1] += float(np.sum((speed / sigma) ** 2))
         self.b_parameters[-1, 0] -= float(np.sum(speed * left))
-        where = [2 * n * cell[:, None] + n * k + np.arange(n) for k in range(4)]
+        count, p = len(z) - 1, len(self.corner)
+        both, band = (x.reshape(-1, n, x.shape[1]) for x in (self.both, self.band.T))
+
+        def by_cell(x: Array) -> Array:
+            """Return sums of a value of each sample, cell by cell, shape (cell,)."""
+            return np.bincount(cell, x, minlength=count)
+
         for k in range(4):
-            np.add.at(self.b_nodes[:, 0], where[k], w[k][:, None] * left)
-            np.add.at(self.border[:, -1], where[k], -w[k][:, None] * speed / sigma**2)
+            rows = slice(k, k + 2 * count, 2)  # position and velocity of a node follow each other
+            both[rows, :, p] += np.stack([by_cell(w[k] * x) for x in left.T], axis=-1)
+            both[rows, :, p - 1] -= np.stack([by_cell(w[k] * x) for x in (speed / sigma**2).T], axis=-1)
             for m in range(k + 1):
-                np.add.at(self.band, (np.full_like(where[m], n * (k - m)), where[m]), (w[k] * w[m])[:, None] / sigma**2)
+                band[slice(m, m + 2 * count, 2), :, n * (k - m)] += by_cell(w[k] * w[m])[:, None] / sigma**2
 
     def _add_velocities(self, z: Array, noise: Noise) -> None:
         weight, left = noise.velocity**-2, noise.wanted - z[:, 1]
@@ -164,7 +171,8 @@ class NormalEquations:
     def _add_cells(self, first: int, H: Array, W: Array, rho: Array) -> None:
         """Add residuals rho, (cell, joint, right), of slopes H, (cell, 4 n, joint), by nodes and W, (cell, joint, p), by X."""
         (count, width), p = H.shape[:2], W.shape[-1]
-        own = np.matmul(H, np.swapaxes(H, -1, -2))
+        # Of a copy: a product with the own transpose goes to BLAS's syrk, three times slower for matrices as small as these.
+        own = np.matmul(H, np.swapaxes(H, -1, -2).copy())
         products = np.matmul(H, np.concatenate([W, rho], axis=-1))
         step = width // 2
         nodes = self.both.reshape(-1, step, self.both.shape[1])
