@@ -124,7 +124,7 @@ class NormalEquations:
 
         def by_cell(x: Array) -> Array:
             """Return sums of a value of each sample, cell by cell, shape (cell,)."""
-            return np.bincount(cell, x, minlength=count)
+            return np.bincount(cell, x, minlength=count).astype(np.float64)
 
         for k in range(4):
             rows = slice(k, k + 2 * count, 2)  # position and velocity of a node follow each other
