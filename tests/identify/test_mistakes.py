@@ -9,6 +9,7 @@ import pytest
 from idbench.identify.arrays import combined
 from idbench.identify.judge.fitted_motion import FittedMotion
 from idbench.identify.judge.mistakes import OF_JOINTS, OF_ROBOT
+from idbench.identify.judge.whole_mistakes import DECISIVE, _likely, _others
 from idbench.identify.signals.signals import State
 
 spec = importlib.util.spec_from_file_location("fault_logs", Path(__file__).parent / "fault_logs.py")
@@ -118,6 +119,20 @@ def test_what_a_mistake_explains_is_its_part_of_the_residual():
 )
 def test_large_mistakes_are_named_on_each_motion(robot, name, cause):
     assert [case(robot, name, 4.0, seed).found()[0].cause for seed in range(3)] == [cause] * 3
+
+
+@pytest.mark.parametrize("name", ["exchanged", "wall", "plain"])
+def test_the_middle_of_a_log_leaves_the_mistake_that_all_of_it_shows(name):
+    """Most are refuted by it; the one that explains most is not."""
+    fault = logs.FAULTS["none" if name == "plain" else name]
+    problem = logs.Case("puma560", 4.0, name, 0, *fault, {"time": 120.0}).problem().explicit
+    counts, before = problem.factors.rows, float(problem.factors.misfit())
+    every, likely = list(_others(problem)), {each.key for each in _likely(problem)}
+    gains = {each.key: before - each.misfit(counts) for each in every}
+    best = max(gains, key=lambda key: gains[key])
+    assert (gains[best] > DECISIVE) == (name != "plain")
+    assert best in likely or name == "plain"
+    assert len(likely) < len(every) / 2
 
 
 @pytest.mark.thorough
