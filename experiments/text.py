@@ -200,6 +200,11 @@ def percent(share: float) -> str:
     return f"{share:+.0f}" if size >= 100 else f"{share:+.2f}" if size >= 0.01 else f"{share:+.0e}" if size else "0"
 
 
+def with_unit(name: str, unit: str) -> str:
+    """Return a name with its unit in brackets, if there is one."""
+    return f"{name} [{unit.replace('^2', '²')}]" if unit else name
+
+
 def round_values(low: float, high: float) -> npt.NDArray[np.float64]:
     """Return round values between the ends of an axis, `TICKS` at most."""
     least = (high - low) / (TICKS - 1)

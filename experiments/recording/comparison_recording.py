@@ -27,9 +27,9 @@ from idbench.experiments.recording.lanes import about
 from idbench.experiments.recording.layouts import tabs
 from idbench.experiments.recording.motion_layer import Base
 from idbench.experiments.recording.scales import listed, signed
-from idbench.experiments.recording.stream import Stream
+from idbench.experiments.recording.stream import SIZES, Stream
 from idbench.experiments.reports.estimates import markdown
-from idbench.experiments.text import FORM_WIDTHS, FORMS, GREY, joint_colors, lighter, model_color
+from idbench.experiments.text import FORM_WIDTHS, FORMS, GREY, joint_colors, lighter, model_color, with_unit
 from idbench.identify import scara
 from idbench.sim.scenario.scenario_file import to_toml
 
@@ -115,12 +115,12 @@ def _emphasized(error_percent: float) -> str:
 
 def _markdown(table: Table2) -> str:
     """Return the explicit and the power model's estimates beside the paper's."""
-    units = [unit.replace("^2", "²") for unit in scara().units]
+    units = scara().units
     lines = ["| | true | | paper | paper's steps | idbench |", "|---|---:|---|---:|---:|---:|"]
     for i, (name, true) in enumerate(table.truth.items()):
         for form in ("explicit", "power"):
             X = [found[form].estimates[form].X[i] for found in table.found.values()]
-            head = f"{name} [{units[i]}] | {true:g}" if form == "explicit" else " | "
+            head = f"{with_unit(name, units[i])} | {true:g}" if form == "explicit" else " | "
             lines.append(f"| {head} | {form} | {PAPER[form].estimate[i]:g} | {' | '.join(f'{x:.4g}' for x in X)} |")
     return "\n".join(lines)
 
@@ -184,6 +184,9 @@ def _chunks(path: Path) -> Iterator[Chunk]:
 def _place(path: str, name: str, number: int, several: bool) -> str | None:
     """Return where an entity of a run goes; None if it is left out."""
     head, *rest = path.split("/")
+    if head == SIZES:
+        of = _place("/".join(rest[1:]), name, number, several)
+        return of and "/".join([head, rest[0], of])
     if head in ("identify", "legend") and rest and rest[0] != "joints":
         return "/".join([head, f"{part(name)}-{rest[0]}" if several else part(name), *rest[1:]])
     if not number:

@@ -19,7 +19,7 @@ from idbench.experiments.recording.views import (
     text,
     window,
 )
-from idbench.experiments.text import UNITS
+from idbench.experiments.text import UNITS, with_unit
 from idbench.identify import BLOCKS, scara
 from idbench.identify.basis.tree_links import KINDS
 
@@ -195,8 +195,9 @@ def _estimates(shelf: Shelf, names: Sequence[str]) -> Part:
 
 
 def _estimate(shelf: Shelf, name: str) -> Part:
-    unit = _known_units().get(_letters(name), "").replace("^2", "²")
-    return plot(shelf, f"{name} [{unit}]" if unit else name, f"identify/*/*/estimate/{name}", f"truth/{name}")
+    return plot(
+        shelf, with_unit(name, _known_units().get(_letters(name), "")), f"identify/*/*/estimate/{name}", f"truth/{name}"
+    )
 
 
 def _fits(shelf: Shelf, rows: Sequence[str]) -> Iterator[Part]:

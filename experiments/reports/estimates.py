@@ -12,7 +12,7 @@ from idbench.experiments.identification.fit import Fit
 from idbench.experiments.judgement.held_out import FAIR, GOOD, Verdict
 from idbench.experiments.judgement.judgement import Judgement
 from idbench.experiments.judgement.warnings import DELAY, FLAGS, LOG, doubtful, used
-from idbench.experiments.text import WORTHLESS, error_percentage, number, percent, relative
+from idbench.experiments.text import WORTHLESS, error_percentage, number, percent, relative, with_unit
 from idbench.identify import Estimate
 from idbench.identify.arrays import Array
 from idbench.identify.tables import concise
@@ -49,8 +49,11 @@ class EstimatesTable:
         """Yield the truth and the estimates alone, with all marks, units beside the names."""
         for i, name in self._shown:
             each = ((e.X[i], e.standard_errors[i], self._marks[m][i]) for m, e in self.estimates.items())
-            head = f"{name} [{self.fit.basis.units[i].replace('^2', '²')}]"
-            yield [head, *self._true(i), *(f"{concise(x, sigma)}{''.join(marks).strip()}" for x, sigma, marks in each)]
+            yield [
+                with_unit(name, self.fit.basis.units[i]),
+                *self._true(i),
+                *(f"{concise(x, sigma)}{''.join(marks).strip()}" for x, sigma, marks in each),
+            ]
 
     def whole(self) -> Iterator[list[str]]:
         """Yield the cells of what is said of each fit as a whole."""
