@@ -57,7 +57,7 @@ def _of_models(study: str, first: str = "noise") -> Iterator[str]:
                 NOISES[noise],
                 chain,
                 estimator,
-                *(_cell(found.get((noise, chain, estimator, *pair))) for pair in PAIRS[:3]),
+                *(_cell(found.get((noise, chain, estimator, *pair))) for pair in PAIRS),
             ]
 
     yield from table([first, "chain", "estimator", *(f"{a} / {b}" for a, b in PAIRS)], rows())
