@@ -54,7 +54,8 @@ def picture(place: Path) -> None:
     mean, rms, least = (np.array([c[f"{x}_percent"] for c in found]) for x in ("bias", "rmse", "bound"))
     runs = np.array([c["runs"] for c in found])[:, None]
     spread = np.sqrt(np.maximum(rms**2 - mean**2, 0) * runs / (runs - 1))  # of a sample, as the study's report has it
-    bars([c["estimator"] for c in found], RobotModel("scara").basis.names, mean, spread, least).savefig(place, dpi=100)
+    names, parameters = [c["estimator"] for c in found], RobotModel("scara").basis.names
+    bars(names, parameters, mean, spread, least, runs=int(runs.max())).savefig(place, dpi=100)
 
 
 def _compared(found: Sequence[Cell], key_of: Callable[[dict[str, Any]], Key], heads: Mapping[Key, str]) -> Iterator[str]:

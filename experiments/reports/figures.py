@@ -101,7 +101,7 @@ def friction_figure(fit: Fit) -> str:
         panel = Panel(f"{joint}: {' + '.join(fit.robot_model.laws.names[j])}")
         panel.dots(v, torque, "#999999", 1.0, "torque minus that of the links")
         for number, line in enumerate(curves.laws(j)):
-            inside = np.abs(line.v) <= np.abs(v).max(initial=0.0)
+            inside = (line.v >= v.min(initial=0.0)) & (line.v <= v.max(initial=0.0))
             labels = ("", "") if number else ("estimated law", "beyond the speeds of the log")
             panel.line(line.v, np.where(inside, line.torque, np.nan), color_of("explicit"), 1.6, labels[0])
             panel.line(line.v, np.where(inside, np.nan, line.torque), color_of("power"), 1.6, labels[1], "2 3")

@@ -134,7 +134,8 @@ def figure(panels: Sequence[Panel], height: float, x: str = "", y: str = "") -> 
     ]
     words = [f"<span>{escape(_axes(x, y))}</span>"]
     for kind, color, label in _labels(panels):
-        words.append(f'<span><i class="{kind.split()[0]}" style="background:{color}"></i>{escape(label)}</span>')
+        shape = "line dashed" if len(kind.split()) > 1 else kind.strip()
+        words.append(f'<span><i class="{shape}" style="background:{color}"></i>{escape(label)}</span>')
     return "\n".join([f'<div class="legend">{" ".join(words)}</div><div class="panels">', *each, "</div>"])
 
 

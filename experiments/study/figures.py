@@ -134,32 +134,36 @@ def bars_figure(cells: Sequence[Cell]) -> str:
     if len(parameters) > MANY:
         return matrix_figure(names, parameters, 100 * np.array([cell.rmse for cell in cells]), "rms error [%]")
     numbers = ([cell.bias for cell in cells], [cell.deviation for cell in cells], [cell.least() for cell in cells])
-    return svg(bars(names, parameters, *(100 * np.array(x) for x in numbers)))
+    return svg(bars(names, parameters, *(100 * np.array(x) for x in numbers), runs=max(cell.runs for cell in cells)))
 
 
-def bars(names: Sequence[str], parameters: Sequence[str], mean: Array, spread: Array, least: Array) -> Figure:
+def bars(  # the last by its name
+    names: Sequence[str], parameters: Sequence[str], mean: Array, spread: Array, least: Array, *, runs: int
+) -> Figure:
     """Return mean and standard deviation of errors [%], shape (method, parameter), against the least that noise allows.
 
-    A panel reaches as far as four times the median of the bars; what is beyond points there.
+    Of few `runs`, a standard deviation may lie below what noise allows on average. A panel reaches as far as four times the
+    median of the bars; what is beyond points there.
     """
     figure, panels = _panels(parameters, below=1.1, gap=0.65)
     at, spread = np.arange(len(names)), np.nan_to_num(spread)
+    words = f"mean and standard deviation of the errors of {runs} runs"
     for p, panel in enumerate(panels.values()):
         sizes = (np.abs(mean[:, p]) + spread[:, p])[np.isfinite(mean[:, p])]
         limit = REACH * float(np.median(sizes)) if len(sizes) and np.median(sizes) > 0 else 1.0
         panel.axhline(0.0, color="black", lw=0.6)
         if np.isfinite(least[:, p]).any():
             bound = float(np.nanmean(least[:, p]))
-            panel.axhspan(-bound, bound, color="0.8", lw=0, label="least standard deviation that noise allows (bound)")
+            panel.axhspan(
+                -bound, bound, color="0.8", lw=0, label="bound: least standard deviation that noise allows, on average"
+            )
         inside = np.abs(mean[:, p]) < limit
         shown = at[inside], mean[inside, p], spread[inside, p]
-        panel.errorbar(
-            *shown, fmt="o", ms=3, lw=1.2, capsize=2, color="#5b7db1", label="mean error, and its standard deviation"
-        )
+        panel.errorbar(*shown, fmt="o", ms=3, lw=1.2, capsize=2, color="#5b7db1", label=words)
         for x, y in zip(at[~inside], mean[~inside, p], strict=True):
-            high = 0.93 * limit * np.sign(y)
+            high, side = 0.93 * limit * np.sign(y), "left" if x < at[-1] / 2 else "right"
             panel.plot(x, high, "^" if y > 0 else "v", ms=4, color="#b15b5b", label="beyond the axis, with its value")
-            panel.text(x, 0.8 * high, f"{y:.2g}", fontsize=6, color="#b15b5b", va="center", ha="center")
+            panel.text(x, 0.8 * high, f"{y:.2g}", fontsize=6, color="#b15b5b", va="center", ha=side)
         panel.set_ylim(-limit, limit)
         panel.set_xticks(at, names, rotation=90, fontsize=6)
         panel.tick_params(labelbottom=True)
