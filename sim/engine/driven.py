@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from idbench.identify.data.motion_log import MotionLog
+from idbench.identify.errors import InvariantError
 from idbench.sim.engine.failures import Bounds
 from idbench.sim.engine.plant import Plant
 from idbench.sim.errors import ScenarioError
@@ -25,7 +26,7 @@ STEP, SHORTEST = 0.002, 0.001
 one is for joints that friction stops in less."""
 
 Feedback = Callable[[int, Plant], Array]
-"""Torque beside that of the log at a sample [N m], shape (joint,)."""
+"""Torque beside that of the log at a sample [N m], shape (nsim, joint)."""
 
 
 @final
@@ -40,7 +41,7 @@ class Replay:
 
 
 def replays(robots: Sequence[Robot], logs: Sequence[MotionLog], qd: Array, bandwidth: float) -> list[Replay | str]:
-    """Return what robots do with torques, as one batch; of one that runs away, when and how.
+    """Return what robots do with torques, those that are integrated alike as one batch; of one that runs away, when and how.
 
     The torques act as their log's channel says; the loop adds M (w^2 e + 2 w de/dt), M the diagonal of the inertia matrix. A
     robot with the parameters of the one that was logged needs no feedback, beside noise.
@@ -50,12 +51,29 @@ def replays(robots: Sequence[Robot], logs: Sequence[MotionLog], qd: Array, bandw
     robots : sequence of Robot
         To be simulated: one robot with other parameters each.
     logs : sequence of MotionLog
-        One run, with the torques that each of them gets.
+        One run, with the torques that each of them gets: their positions and instants are the same.
     qd : Array, shape (time, joint)
         Velocities of the log [rad/s].
     bandwidth : float
         Natural frequency w of the loop [rad/s].
+
+    Raises
+    ------
+    RobotError
+        If the robots differ in more than parameters.
     """
+    if len({(log.fs, log.samples) for log in logs}) > 1:
+        raise InvariantError("logs of one run must have the same instants")
+    groups, found = dict[Physics, list[int]](), dict[int, Replay | str]()
+    for k, (robot, log) in enumerate(zip(robots, logs, strict=True)):
+        groups.setdefault(physics_of(robot, log), []).append(k)
+    for group in groups.values():
+        each = _replayed([robots[k] for k in group], [logs[k] for k in group], qd, bandwidth)
+        found |= dict(zip(group, each, strict=True))
+    return [found[k] for k in range(len(robots))]
+
+
+def _replayed(robots: Sequence[Robot], logs: Sequence[MotionLog], qd: Array, bandwidth: float) -> list[Replay | str]:
     log, nsim = logs[0], len(robots)
     reference = Reference(log.fs, log.q, qd, np.zeros_like(qd))
     kp = np.stack([_inertia(robot, log.q) for robot in robots], axis=1) * bandwidth**2
@@ -153,30 +171,27 @@ def _start(
 
     The torques have the shape (step, time, joint).
     """
-    log = logs[0]
-    physics = physics_of(robots, log.q[:1])
-    h, per_sample = physics_steps(log.fs, physics.step)
-    plant = Plant(robots[0], len(q), physics, h, vary or {}, threads)
+    log, physics = logs[0], physics_of(robots[0], logs[0])
+    plant = Plant(robots[0], len(q), physics, physics.step, vary or {}, threads)
     plant.q[:], plant.qd[:] = q, qd
     if len(robots) > 1:
         plant.become(robots)
-    torques = np.concatenate([mean_torques(one, h, per_sample) for one in logs])
+    per_sample, late = round(1 / log.fs / physics.step), physics.early * physics.step
+    acting = [replace(one, torque=replace(one.torque, delay=one.torque.delay + late)) for one in logs]
+    torques = np.concatenate([mean_torques(one, physics.step, per_sample) for one in acting])
     return plant, np.ascontiguousarray(torques.swapaxes(0, 1))
 
 
-def physics_of(robots: Sequence[Robot], q: Array) -> Physics:
-    """Return how robots are integrated whose viscous friction stops a joint in M / Fv [s], at q [rad], shape (1, joint).
+def physics_of(robot: Robot, log: MotionLog) -> Physics:
+    """Return how a robot is integrated that a log drives, in whole steps a sample.
 
-    RK4 follows it with as long a step, and becomes unstable where a step is 2.8 times as long: what stops sooner than the
-    shortest step is integrated implicitly.
+    RK4 follows joints that viscous friction stops in M / Fv with as long a step, and becomes unstable where a step is 2.8 times
+    as long: what stops in less than the shortest is integrated implicitly (to first order, and half a step early).
     """
-    stopping = np.inf
-    for robot in robots:
-        Fv = robot.model.dof_damping if robot.model.dof_damping.ndim == 1 else robot.model.dof_damping[:, 0]
-        times = np.divide(_inertia(robot, q)[0], Fv, out=np.full(robot.n, np.inf), where=Fv > 0)
-        stopping = min(stopping, float(times.min()))
-    step = float(np.clip(stopping, SHORTEST, STEP))
-    return Physics(step) if stopping >= SHORTEST else Physics(step, "implicitfast")
+    Fv = robot.model.dof_damping if robot.model.dof_damping.ndim == 1 else robot.model.dof_damping[:, 0]
+    stopping = float(np.min(np.divide(_inertia(robot, log.q[:1])[0], Fv, out=np.full(robot.n, np.inf), where=Fv > 0)))
+    h, _ = physics_steps(log.fs, float(np.clip(stopping, SHORTEST, STEP)))
+    return Physics(h) if stopping > h * (1 - 1e-9) else Physics(h, "implicitfast")
 
 
 def _driven(

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 from mujoco.batch import Batch, SimulationError
 
+from idbench.sim.errors import RobotError
 from idbench.sim.robot.motors import Array
 from idbench.sim.robot.robot import Robot
 from idbench.sim.robot.varied import VariedRobots, vary_fields
@@ -64,8 +65,17 @@ class Plant:
         self._errors: dict[int, str] = {}
 
     def become(self, robots: Sequence[Robot]) -> None:
-        """Make every simulation that of another robot, which has the same links and joints with other parameters."""
-        self.batch.set_models([_stepping(robot.model, *self._settings) for robot in robots])
+        """Make every simulation of a plant, of which no fields vary, that of a robot which differs in parameters alone.
+
+        Raises
+        ------
+        RobotError
+            If they differ in more: MuJoCo's data would have another layout.
+        """
+        try:
+            self.batch.set_models([_stepping(robot.model, *self._settings) for robot in robots])
+        except mujoco.FatalError as error:
+            raise RobotError(f"robots of one batch differ in more than parameters: {error}") from error
         self.robots = tuple(robots)
         self.Fs = np.stack([robot.model.dof_frictionloss for robot in robots])
 

@@ -5,10 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from idbench.identify.errors import InvariantError
 from idbench.sim.engine.driven import free_run, physics_of, replays
 from idbench.sim.engine.simulation import simulate
-from idbench.sim.errors import ScenarioError
+from idbench.sim.errors import RobotError, ScenarioError
 from idbench.sim.robot.robot import Robot
+from idbench.sim.scenario.scenario import Physics
 from idbench.sim.scenario.scenario_file import load
 from idbench.sim.trajectories import RandomMoves
 
@@ -52,8 +54,9 @@ def changed(**fields):
 
 def test_replays_of_a_batch_are_those_of_each_robot(log):
     qd = np.gradient(log.q, 1 / log.fs, axis=0)
-    robots = [Robot.load("scara"), changed(dof_damping=0.3), changed(dof_frictionloss=0.0)]
-    logs = [log, log, replace(log, tau=0.9 * log.tau)]
+    stiff = changed(dof_damping=[0.0, 200.0])
+    robots = [Robot.load("scara"), changed(dof_damping=0.3), changed(dof_frictionloss=0.0), stiff]
+    logs = [log, log, replace(log, tau=0.9 * log.tau), log]
     together = replays(robots, logs, qd, 5.0)
     for robot, own, found in zip(robots, logs, together, strict=True):
         (alone,) = replays([robot], [own], qd, 5.0)
@@ -71,13 +74,22 @@ def test_a_robot_that_runs_away_leaves_the_others(log):
     np.testing.assert_allclose(good.q, same.q, rtol=0, atol=1e-12)
 
 
+def test_a_batch_of_other_instants_or_other_bodies_is_refused(log):
+    qd = np.gradient(log.q, 1 / log.fs, axis=0)
+    with pytest.raises(InvariantError, match="same instants"):
+        replays([Robot.load("scara")] * 2, [log, log.part(0, 100)], qd, 5.0)
+    with pytest.raises(RobotError, match="more than parameters"):
+        replays([Robot.load("scara"), Robot.load("two_link")], [log] * 2, qd, 5.0)
+
+
 def test_steps_are_as_short_as_friction_asks_and_stiff_joints_stay_stable(log):
-    q = log.q[:1]
-    slow, quick = physics_of([changed(dof_damping=0.0)], q), physics_of([changed(dof_damping=1e4)], q)
+    slow, quick = (physics_of(changed(dof_damping=Fv), log) for Fv in (0.0, 1e4))
     assert (slow.step, slow.integrator) == (0.002, "RK4")
     assert (quick.step, quick.integrator) == (0.001, "implicitfast")
-    middle = physics_of([changed(dof_damping=[0.0, 0.06 / 0.0015])], q)  # ZZ2 = 0.06 kg m^2 of the second joint
-    assert middle.step == pytest.approx(0.0015)
-    assert physics_of([changed(dof_damping=0.0), changed(dof_damping=1e4)], q) == quick
+    middle = physics_of(changed(dof_damping=[0.0, 0.06 / 0.0015]), log)  # ZZ2 = 0.06 kg m^2 of the second joint
+    assert 0.0014 < middle.step < 0.0015  # in whole steps a sample
+    assert middle.integrator == "RK4"
+    fine = replace(log, fs=4000.0)
+    assert physics_of(changed(dof_damping=[0.0, 0.06 / 0.0005]), fine) == Physics(1 / 4000)  # samples are short enough
     (held,) = replays([changed(dof_damping=1e4)], [log], np.gradient(log.q, 1 / log.fs, axis=0), 5.0)
     assert np.isfinite(held.q).all()
