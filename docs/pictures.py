@@ -131,13 +131,14 @@ SECTIONS = {"friction": "friction"}
 def real(names: list[str], logs: Path) -> None:
     """Run what the page of the real robot runs, in a copy of the folder of its files, and photograph it."""
     for name in names:
-        unread = shutil.ignore_patterns("log.toml" if name == "real-log" else "")  # which the page writes after it
+        later = ["log.toml"] if name == "real-log" else []  # the page writes it afterwards
+        unread = shutil.ignore_patterns("*.png", *later)
         with tempfile.TemporaryDirectory(prefix="idbench-") as folder, chdir(folder):
             shutil.copytree(logs, folder, ignore=unread, dirs_exist_ok=True)
             for command in REAL[name]:
                 if idbench(command.split()):
                     sys.exit(f"{command} failed")
-            if Path(f"{name}.png").is_file():
+            if "--picture" in REAL[name][-1]:
                 shutil.copy(f"{name}.png", DOCS / f"{name}.png")
             else:
                 page = Path(name) / "report.html"

@@ -32,10 +32,16 @@ TICKS = 6
 """Values that have room beside an axis."""
 
 NICE = (1.0, 2.0, 2.5, 3.0, 4.0, 5.0, 10.0)
-"""What these are multiples of, times a power of ten."""
+"""Steps between the values beside an axis, times a power of ten."""
 
 ROUNDING = 1e-9
-"""Share of a step by which they are off as numbers."""
+"""Share of a step by which a value beside an axis is off as a number."""
+
+DECADE_STEPS = (1.0,), (1.0, 3.0), (1.0, 2.0, 5.0)
+"""Values within a decade that are written beside a logarithmic axis: the first that are more than `ENOUGH`."""
+
+ENOUGH = 2
+"""Values beside an axis with which it can be read."""
 
 SIGMAS = 2.0
 """Half the width of intervals, in standard errors: 95 %."""
@@ -206,18 +212,26 @@ def with_unit(name: str, unit: str) -> str:
 
 
 def round_values(low: float, high: float) -> npt.NDArray[np.float64]:
-    """Return round values between the ends of an axis, `TICKS` at most."""
+    """Return round values between the ends of an axis, low < high, `TICKS` at most."""
     least = (high - low) / (TICKS - 1)
     power = 10.0 ** np.floor(np.log10(least))
     step = power * min(x for x in NICE if x * power >= least * (1 - ROUNDING))
     return np.asarray(step * np.arange(np.ceil(low / step - ROUNDING), np.floor(high / step + ROUNDING) + 1) + 0.0)  # no -0
 
 
-def powers_of_ten(low: float, high: float) -> npt.NDArray[np.float64]:
-    """Return exponents of powers of ten for a logarithmic axis, `TICKS` between its ends at most, and one below."""
+def decade_values(low: float, high: float) -> npt.NDArray[np.float64]:
+    """Return round values for a logarithmic axis, 0 < low < high: powers of ten if there are some, and others between them.
+
+    Those of an axis that is too short for them are equally far apart.
+    """
     powers = np.arange(np.floor(np.log10(low) + ROUNDING), np.floor(np.log10(high) + ROUNDING) + 1)
     every = max(1, ceil(np.count_nonzero(powers >= np.log10(low) - ROUNDING) / TICKS))
-    return powers[powers % every == 0]
+    for steps in DECADE_STEPS:
+        found = np.outer(10.0 ** powers[powers % every == 0], steps).ravel()
+        found = found[(found >= low * (1 - ROUNDING)) & (found <= high * (1 + ROUNDING))]
+        if len(found) > ENOUGH:
+            return found
+    return round_values(low, high)
 
 
 def percentage(x: float) -> str:

@@ -135,7 +135,7 @@ def picture(place: Path) -> None:
     """Draw the torque errors of every joint, by set and tool."""
     from idbench.experiments.benchmark.tables import errors_figure
 
-    sets = {row["title"]: {name: row["percent"].get(tool, []) for tool, name in TOOLS.items()} for row in _with_torques()}
+    sets = [(row["title"], {name: row["percent"].get(tool, []) for tool, name in TOOLS.items()}) for row in _with_torques()]
     errors_figure(sets).savefig(place, dpi=120)
 
 

@@ -160,6 +160,8 @@ def beside_published(row: Row, published: Row) -> str:
     ours, unit = METRICS[published["metric"]]
     own = ours(row)
     mine = f"{own:.3g}{unit}" if np.isfinite(own) else "not known"
+    lengths = {f"{one['length']:g} s" for one in row.get("free_run", ()) if "length" in one}
+    mine += f" in stretches of {' and '.join(lengths)}" if lengths and published["metric"] == "free run" else ""
     return (
         f"{published['metric']}: {OWN} {mine} on the held-out logs of this set; published {published['value']:g}{unit} "
         f"({published['by']}: {published['split']})"
@@ -218,9 +220,9 @@ def shares(row: Row) -> dict[str, list[float]]:
     return {(OWN if tool.startswith(OWN) else tool): [float(x) for x in e if np.isfinite(x)] for tool, e in every.items()}
 
 
-def shares_of_sets(rows: Sequence[Row]) -> dict[str, dict[str, list[float]]]:
-    """Return the torque errors of each joint over its torque [%], by set and tool, of sets that have torques."""
-    return {row["title"]: shares(row) for row in rows if row_measure(row) is TORQUE}
+def shares_of_sets(rows: Sequence[Row]) -> list[tuple[str, Mapping[str, Sequence[float]]]]:
+    """Return titles of sets that have torques, and the errors of each joint over its torque [%], by tool."""
+    return [(row["title"], shares(row)) for row in rows if row_measure(row) is TORQUE]
 
 
 def report(rows: Sequence[Row], failures: Mapping[str, str]) -> str:
@@ -245,18 +247,18 @@ def report(rows: Sequence[Row], failures: Mapping[str, str]) -> str:
     )
 
 
-def errors_figure(sets: Mapping[str, Mapping[str, Sequence[float]]]) -> Figure:
+def errors_figure(sets: Sequence[tuple[str, Mapping[str, Sequence[float]]]]) -> Figure:
     """Return torque errors of every joint [% of its torque], by set and tool: a line a set, a colour a tool."""
-    tools = list(dict.fromkeys(tool for each in sets.values() for tool in each))
+    tools = list(dict.fromkeys(tool for _, each in sets for tool in each))
     figure = Figure(figsize=(8, 1.2 + 0.5 * len(sets)), layout="constrained")
     panel = figure.subplots()
     for k, tool in enumerate(tools):
         height = 0.6 * ((k + 0.5) / len(tools) - 0.5)
-        places = [(share, y + height) for y, each in enumerate(sets.values()) for share in each.get(tool, ())]
+        places = [(share, y + height) for y, (_, each) in enumerate(sets) for share in each.get(tool, ())]
         x, y = np.array(places).reshape(-1, 2).T
         color = [c / 255 for c in JOINTS[k % len(JOINTS)]]
         panel.plot(x, y, ".", color=color, label=tool, markersize=7)
-    panel.set_yticks(range(len(sets)), list(sets), parse_math=False)
+    panel.set_yticks(range(len(sets)), [title for title, _ in sets], parse_math=False)
     panel.invert_yaxis()
     panel.set_xscale("log")
     panel.xaxis.set_major_formatter("{x:g}")

@@ -89,7 +89,7 @@ class SimulatedLogs:
         plain, chain = self.robot_model.plain, request.processing
         filed = np.array(list(plain.truth(self.robot_model.robot).values()))
         each = (instants(chain.signals(log), plain.basis, ExplicitModel(), chain, filed).in_rows(chain) for log in logs)
-        return np.asarray(np.linalg.norm(np.concatenate(list(each), axis=-1), axis=-1))
+        return np.asarray(np.linalg.norm(np.concatenate([rows.reshape(-1, plain.basis.n) for rows in each]), axis=0))
 
     def _words(self, read: ReadLog) -> str:
         robot = self.robot_model.robot

@@ -1,6 +1,6 @@
 """A fit on a log that it was not fitted to: torques, the identified robot simulated, and a verdict on each model."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import ceil
@@ -195,7 +195,8 @@ class HeldOut:
             except (BenchError, IdentificationError) as error:
                 found[model] = str(error)
         if driven:
-            found |= dict(zip(driven, _replayed(list(driven.values()), qd), strict=True))
+            robots, logs = zip(*driven.values(), strict=True)
+            found |= dict(zip(driven, replays(robots, logs, qd, BANDWIDTH), strict=True))
         return {model: found[other] for model, other in same.items()}
 
     def _agree(self, model: str, other: str) -> bool:
@@ -279,15 +280,6 @@ class HeldOut:
             found["within_interval"] = [finite(x) for x in within[0]]
             found["outside_fitted"] = within[1]
         return {**found, "position_error_rms": None if off is None else off.tolist()}
-
-
-def _replayed(driven: Sequence[tuple[Robot, MotionLog]], qd: Array) -> list[Replay | str]:
-    """Return what robots do with the torques of their logs, together where that can be, or why it is not known."""
-    robots, logs = zip(*driven, strict=True)
-    try:
-        return replays(robots, logs, qd, BANDWIDTH)
-    except BenchError as error:  # files with the same joints may have bodies of other kinds
-        return [str(error)] if len(driven) == 1 else [_replayed([one], qd)[0] for one in driven]
 
 
 def _without(log: MotionLog, qd: Array, basis: Basis, laws: Mapping[Parameter, float]) -> MotionLog:

@@ -134,6 +134,7 @@ class Table1:
             "seed": self.scenario.seed,
             "scenario": to_dict(self.scenario),
             "parameters": list(self.truth),
+            "units": list(scara().units),
             "truth": truth,
             "chain": main,
             "models": by_chain[main],

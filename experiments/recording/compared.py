@@ -122,7 +122,7 @@ def estimates(runs: Sequence[Compared]) -> str:
     if not models or not names:
         return "No model gave an estimate in all of them."
     found = [_of(run, models[0]) for run in runs]
-    truth, units = _truth(runs[0]), dict(zip(runs[0].summary["parameters"], runs[0].summary["units"], strict=True))
+    truth, units = _truth(runs[0]), dict(zip(runs[0].summary["parameters"], runs[0].summary.get("units", ()), strict=False))
     head = [
         f"**Estimates**, {models[0]} model; the difference of the last from the first, in its sigma\n",
         f"| | true | {' | '.join(run.name for run in runs)} | difference |",
@@ -134,7 +134,8 @@ def estimates(runs: Sequence[Compared]) -> str:
         off = (X[-1] - X[0]) / max(float(np.hypot(sigma[0], sigma[-1])), 1e-300)
         marked = f"**{off:+.1f}**" if abs(off) > CLEAR else f"{off:+.1f}"
         true = f"{truth[name]:g}" if name in truth else ""
-        rows.append(f"| {with_unit(name, units[name])} | {true} | {' | '.join(map(concise, X, sigma))} | {marked} |")
+        label = with_unit(name, units.get(name, ""))
+        rows.append(f"| {label} | {true} | {' | '.join(map(concise, X, sigma))} | {marked} |")
     return "\n".join([*head, *rows])
 
 

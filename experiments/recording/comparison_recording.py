@@ -1,4 +1,4 @@
-"""The recording of a comparison: several runs laid over each other, with what differs said first."""
+"""The recording of a comparison: several runs laid over each other, estimates and what differs beside them."""
 
 from collections.abc import Iterator, Sequence
 from collections.abc import Set as AbstractSet

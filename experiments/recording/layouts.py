@@ -50,8 +50,8 @@ def table2(shelf: Shelf) -> Part:
         return None
     found = charts(shelf, "error [%], {1}'s steps", "processing/*", NARROW)
     signals = column(
-        plot(shelf, "in the log [N m]", "torque/log"),
-        plot(shelf, "true - commanded [N m]", "torque/disturbance"),
+        plot(shelf, "torque [N m], logged", "torque/log"),
+        plot(shelf, "torque [N m], true - commanded", "torque/disturbance"),
     )
     left = column(side_by_side("twin", arm(shelf), signals, shares=[2, 3]), text(shelf, "table2"), shares=[3, 5])
     steps = column(*found)

@@ -9,15 +9,9 @@ from typing import final
 import numpy as np
 import numpy.typing as npt
 
-from idbench.experiments.text import powers_of_ten, round_values
+from idbench.experiments.text import decade_values, round_values
 from idbench.identify import Array
 from idbench.identify.arrays import TINY
-
-DECADE_STEPS = (1.0,), (1.0, 3.0), (1.0, 2.0, 5.0)
-"""Values within a decade that are written beside a logarithmic axis: the first that are more than `ENOUGH`."""
-
-ENOUGH = 2
-"""Values beside an axis with which it can be read."""
 
 ROOM, WIDER = 0.04, 2.0
 """Share of an axis that stays free at either end; how much farther one of decades to both sides reaches than its values."""
@@ -79,11 +73,7 @@ class Decades(AbstractScale):
         return np.log10(np.maximum(x, TINY))
 
     def _values(self) -> Array:
-        for steps in DECADE_STEPS:  # of a short axis, values between the powers of ten, too
-            found = np.outer(10.0 ** powers_of_ten(self.low, self.high), steps).ravel()
-            if np.count_nonzero((found >= self.low) & (found <= self.high)) > ENOUGH:
-                return found
-        return round_values(self.low, self.high)
+        return decade_values(self.low, self.high)
 
 
 @final
@@ -97,7 +87,8 @@ class Signed(AbstractScale):
         return np.arcsinh(x / self.bend)
 
     def _values(self) -> Array:
-        most = int(np.log10(self.high / self.bend))
+        if (most := int(np.log10(self.high / self.bend))) < 1:
+            return round_values(self.low, self.high)
         powers = self.bend * 10.0 ** np.arange(most, 0, -max(1, ceil(most / 2)))  # at bend itself they would touch 0
         return np.concatenate([-powers, [0.0], powers])
 

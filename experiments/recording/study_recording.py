@@ -152,8 +152,9 @@ class AxisCharts:
         chart.marks("worst", x, y, WORST)
         if worst:  # one label: those of others would lie on it
             k = int(y.argmax())
-            inwards = np.sign((len(self._x.words) - 1) / 2 - x[k : k + 1])  # or it would cover the numbers of the axis
-            chart.write("worst", x[k : k + 1] + inwards, y[k : k + 1], [f"run {worst[k][-2]}"])
+            width = len(self._x.words)
+            inside = np.clip(x[k : k + 1], LABEL * width - 0.5, (1 - LABEL) * width - 0.5)  # or the axis' numbers were covered
+            chart.write("worst", inside, y[k : k + 1], [f"run {worst[k][-2]}"])
         self.stream.keep(f"{path}/marks/worst", rr.AnyValues(commands=[command for *_, command in worst] or ["none"]))
 
 
@@ -164,6 +165,9 @@ EDGES = np.arange(-6.25, 6.3, 0.5)
 """Bins of errors in sigma; what lies beyond counts in the outermost."""
 
 TYPICAL = "*Typical error: geometric mean, over the parameters, of the rms error of all runs.*"
+
+LABEL = 0.2
+"""Share of an axis that half of a run's label takes."""
 
 LISTED = 5
 """Worst runs that have room beside the charts."""
@@ -252,6 +256,6 @@ def _send_sigmas(stream: Stream, cells: Sequence[Cell]) -> None:
 def _text(study: Study, cells: Sequence[Cell], folder: Path, worst: Sequence[tuple[Cell, str, float, int]]) -> str:
     lines = [
         f"- {name} {100 * e:+.2g} %: {where(cell, cells)}\n  `{command(study, folder, cell, run)}`"
-        for cell, name, e, run in worst
+        for cell, name, e, run in worst[:LISTED]
     ]
-    return "\n\n".join([f"# {study.question}", answer(cells, study.edges), TYPICAL, "## Worst runs", "\n".join(lines[:LISTED])])
+    return "\n\n".join([f"# {study.question}", answer(cells, study.edges), TYPICAL, "## Worst runs", "\n".join(lines)])

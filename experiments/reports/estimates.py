@@ -123,10 +123,14 @@ def models_in_full(fit: Fit, asked: bool) -> tuple[str, ...]:
 def differing(fit: Fit, whole: Sequence[str]) -> Iterator[str]:
     """Yield a line on how far the models are from the leading one that are not shown whole."""
     if far := {model: _sigmas_apart(fit, model, whole[0]) for model in fit.estimates if model not in whole}:
-        each = ", ".join(
-            f"{model} by {f'at most {x:.1g}' if x >= LEAST else 'less than 0.01'} sigma" for model, x in far.items()
-        )
+        each = ", ".join(f"{model} by {_far(x)} sigma" for model, x in far.items())
         yield f"other models differ: {each} (--model all shows them)"
+
+
+def _far(sigmas: float) -> str:
+    if not isfinite(sigmas):
+        return "an unknown number of"
+    return f"at most {sigmas:.1g}" if sigmas >= LEAST else f"less than {LEAST:g}"
 
 
 def models_apart(fit: Fit) -> tuple[str, ...]:
@@ -135,10 +139,10 @@ def models_apart(fit: Fit) -> tuple[str, ...]:
 
 
 def _sigmas_apart(fit: Fit, model: str, other: str) -> float:
-    """Return by how many sigma the estimates of two models differ at most."""
+    """Return by how many sigma the estimates of two models differ at most; infinity where one is not known."""
     one, two = fit.estimates[model], fit.estimates[other]
     sigma = np.maximum(np.hypot(one.standard_errors, two.standard_errors), 1e-300)
-    return float(np.max(np.abs(one.X - two.X) / sigma))
+    return float(np.max(np.nan_to_num(np.abs(one.X - two.X) / sigma, nan=np.inf)))
 
 
 def explained(share: Array) -> str:

@@ -7,7 +7,7 @@ from typing import final
 
 import numpy as np
 
-from idbench.experiments.text import ROUNDING, powers_of_ten, round_values
+from idbench.experiments.text import decade_values, round_values
 from idbench.identify import Array
 
 WIDTH = 520.0
@@ -74,7 +74,7 @@ class PanelAxis:
         if self.ticks is not None:
             return {x: text for x, text in self.ticks.items() if low <= x <= high}
         if self.log:
-            return {10.0**k: f"{10.0**k:g}" for k in powers_of_ten(low, high).tolist() if 10.0**k >= low * (1 - ROUNDING)}
+            return {x: f"{x:g}" for x in decade_values(low, high).tolist()}
         return {x: f"{x:.6g}" for x in round_values(low, high).tolist()}
 
 

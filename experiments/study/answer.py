@@ -157,7 +157,7 @@ def _sigmas(cells: Sequence[Cell]) -> str:
         ours, theirs = (100 * np.array([c.coverage(getattr(c, which)) for c in mine]) for which in ("sigma", "paper_sigma"))
         if not np.isfinite(ours).any():
             continue
-        span = f"the worst parameter {np.nanmin(ours):.0f} %, the best {np.nanmax(ours):.0f} %"
+        span = f"{np.nanmin(ours):.0f} to {np.nanmax(ours):.0f} % for single parameters and settings"
         whose = f" with chain {chain}" if len(chains) > 1 else ""
         shares.append(f"{np.nanmean(ours):.0f} %{whose} ({span}; the paper's sigma {np.nanmean(theirs):.0f} %)")
     if not shares:

@@ -157,10 +157,10 @@ def bars(  # the last by its name
             panel.axhspan(
                 -bound, bound, color="0.8", lw=0, label="bound: least standard deviation that noise allows, on average"
             )
-        inside = np.abs(mean[:, p]) < limit
+        inside, beyond = np.abs(mean[:, p]) < limit, np.abs(mean[:, p]) >= limit  # neither where there is no estimate
         shown = at[inside], mean[inside, p], spread[inside, p]
         panel.errorbar(*shown, fmt="o", ms=3, lw=1.2, capsize=2, color="#5b7db1", label=words)
-        for x, y in zip(at[~inside], mean[~inside, p], strict=True):
+        for x, y in zip(at[beyond], mean[beyond, p], strict=True):
             high, side = 0.93 * limit * np.sign(y), "left" if x < at[-1] / 2 else "right"
             panel.plot(x, high, "^" if y > 0 else "v", ms=4, color="#b15b5b", label="beyond the axis, with its value")
             panel.text(x, 0.8 * high, f"{y:.2g}", fontsize=6, color="#b15b5b", va="center", ha=side)

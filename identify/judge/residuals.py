@@ -97,9 +97,8 @@ class Instants:
         return self.equations.weight[..., self.inner]
 
     def in_rows(self, chain: Chain) -> Array:
-        """Return what the rows of a chain make of them, Y - W X by kind, without their W, shape (kind, instant)."""
-        to_rows = chain.operator.map(self.equations, self.equations.weight, chain.grid(self.equations.signals.log))
-        return to_rows.kernel.apply(to_rows.inside * self.everywhere) * to_rows.outside
+        """Return the residuals of rows, Y - W X, of models without e, shape (r,); no column is made."""
+        return chain.map(self.equations).measurement(self.everywhere)
 
 
 def instants(signals: Signals, basis: Basis, model: AbstractModel, chain: Chain, X: Array) -> Instants:

@@ -9,12 +9,12 @@ import numpy as np
 from idbench.identify.basis.basis import Basis
 from idbench.identify.data.motion_log import MotionLog, TorqueChannel
 from idbench.identify.errors import LogError, SettingError, require_not_negative
-from idbench.identify.models import AbstractModel
+from idbench.identify.models import AbstractModel, Equations
 from idbench.identify.plugins import Table
 from idbench.identify.rows.operators import FirLowPass, IirLowPass, Samples, Windows
 from idbench.identify.rows.operators.low_pass import AbstractOperator
 from idbench.identify.rows.operators.windows import AbstractWeakForm
-from idbench.identify.rows.row_map import Grid
+from idbench.identify.rows.row_map import Grid, RowMap
 from idbench.identify.rows.rows import Rows
 from idbench.identify.signals.filters import (
     AbstractDifferentiator,
@@ -73,9 +73,13 @@ class Chain:
         if log.n != basis.n:
             hint = "; its axes are (time, joint), is it transposed?" if log.samples == basis.n else ""
             raise LogError(f"the log has {log.n} joints, the basis {basis.n}{hint}")
-        grid = self.grid(log)
+        _ = self.grid(log)  # too short a log is refused before it is differentiated
         equations = model.equations(basis, signals)
-        return Rows.of(equations, self.operator.map(equations, equations.weight, grid))
+        return Rows.of(equations, self.map(equations))
+
+    def map(self, equations: Equations) -> RowMap:
+        """Return how samples become the rows of a model's equations."""
+        return self.operator.map(equations, equations.weight, self.grid(equations.signals.log))
 
     def pieces(self, log: MotionLog, samples: int) -> list[tuple[int, int]]:
         """Return first sample and end of pieces of a log, each with the samples that its rows look at.

@@ -85,7 +85,7 @@ def windowed(x: Array, weights: Array, before: int, grid: Grid) -> Array:
     padded = np.zeros((*weights.shape[:2], parts * step))
     padded[..., : weights.shape[-1]] = weights
     split = np.swapaxes(padded.reshape(sums, -1, parts, step), 1, 2).reshape(sums * parts, -1)
-    used = np.flatnonzero(split.any(axis=-1))  # windows of rows at different lags overlap in part
+    used = np.flatnonzero(split.any(axis=-1))  # products of two rows' windows are zero where only one of them lies
     products = np.matmul(split[used], np.swapaxes(framed, -1, -2))
     total = np.zeros((*x.shape[:-2], sums, count))
     for k, (which, part) in enumerate(zip(*np.divmod(used, parts), strict=True)):

@@ -14,7 +14,7 @@ from idbench.identify.data.motion_log import MotionLog
 from idbench.identify.errors import InvariantError
 from idbench.sim.engine.failures import Bounds
 from idbench.sim.engine.plant import Plant
-from idbench.sim.errors import ScenarioError
+from idbench.sim.errors import RobotError, ScenarioError
 from idbench.sim.robot.inverse_dynamics import BLOCK, InverseDynamics
 from idbench.sim.robot.motors import Array
 from idbench.sim.robot.robot import Robot
@@ -41,7 +41,7 @@ class Replay:
 
 
 def replays(robots: Sequence[Robot], logs: Sequence[MotionLog], qd: Array, bandwidth: float) -> list[Replay | str]:
-    """Return what robots do with torques, those that are integrated alike as one batch; of one that runs away, when and how.
+    """Return what robots do with torques, as batches of those that are alike; of one that runs away, when and how.
 
     The torques act as their log's channel says; the loop adds M (w^2 e + 2 w de/dt), M the diagonal of the inertia matrix. A
     robot with the parameters of the one that was logged needs no feedback, beside noise.
@@ -56,11 +56,6 @@ def replays(robots: Sequence[Robot], logs: Sequence[MotionLog], qd: Array, bandw
         Velocities of the log [rad/s].
     bandwidth : float
         Natural frequency w of the loop [rad/s].
-
-    Raises
-    ------
-    RobotError
-        If the robots differ in more than parameters.
     """
     if len({(log.fs, log.samples) for log in logs}) > 1:
         raise InvariantError("logs of one run must have the same instants")
@@ -68,8 +63,11 @@ def replays(robots: Sequence[Robot], logs: Sequence[MotionLog], qd: Array, bandw
     for k, (robot, log) in enumerate(zip(robots, logs, strict=True)):
         groups.setdefault(physics_of(robot, log), []).append(k)
     for group in groups.values():
-        each = _replayed([robots[k] for k in group], [logs[k] for k in group], qd, bandwidth)
-        found |= dict(zip(group, each, strict=True))
+        each = [robots[k] for k in group], [logs[k] for k in group]
+        try:
+            found |= dict(zip(group, _replayed(*each, qd, bandwidth), strict=True))
+        except RobotError:  # which differ in more than parameters
+            found |= {k: _replayed([robots[k]], [logs[k]], qd, bandwidth)[0] for k in group}
     return [found[k] for k in range(len(robots))]
 
 

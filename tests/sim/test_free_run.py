@@ -7,6 +7,7 @@ import pytest
 
 from idbench.identify.errors import InvariantError
 from idbench.sim.engine.driven import free_run, physics_of, replays
+from idbench.sim.engine.plant import Plant
 from idbench.sim.engine.simulation import simulate
 from idbench.sim.errors import RobotError, ScenarioError
 from idbench.sim.robot.robot import Robot
@@ -74,12 +75,15 @@ def test_a_robot_that_runs_away_leaves_the_others(log):
     np.testing.assert_allclose(good.q, same.q, rtol=0, atol=1e-12)
 
 
-def test_a_batch_of_other_instants_or_other_bodies_is_refused(log):
+def test_logs_of_other_instants_are_refused_and_other_bodies_are_simulated_alone(log):
     qd = np.gradient(log.q, 1 / log.fs, axis=0)
     with pytest.raises(InvariantError, match="same instants"):
         replays([Robot.load("scara")] * 2, [log, log.part(0, 100)], qd, 5.0)
     with pytest.raises(RobotError, match="more than parameters"):
-        replays([Robot.load("scara"), Robot.load("two_link")], [log] * 2, qd, 5.0)
+        Plant(Robot.load("scara"), 2, Physics(), 1e-3, {}, 1).become([Robot.load("scara"), Robot.load("two_link")])
+    one, other = replays([Robot.load("scara"), Robot.load("two_link")], [log] * 2, qd, 5.0)
+    np.testing.assert_array_equal(one.q, replays([Robot.load("scara")], [log], qd, 5.0)[0].q)
+    assert isinstance(other, str) or not np.array_equal(other.q, one.q)
 
 
 def test_steps_are_as_short_as_friction_asks_and_stiff_joints_stay_stable(log):

@@ -90,3 +90,4 @@ def test_every_axis_has_two_values_at_least_and_has_room_for_them(rng):
         assert 2 <= len(linear("x", [low, low + far]).ticks) <= TICKS
         start = 10 ** rng.uniform(-8, 4)
         assert 2 <= len(decades("x", [start, start * 10 ** rng.uniform(0.02, 9)]).ticks) <= 8
+        assert 2 <= len(signed("x", [10 ** rng.uniform(-3, 6)], bend=0.01).ticks) <= TICKS

@@ -1,5 +1,6 @@
 """Runs laid over each other: estimates first, then the settings that differ, and a motion that begins later is moved back."""
 
+import json
 import shutil
 
 import numpy as np
@@ -7,7 +8,7 @@ import pytest
 from rerun.chunk import RrdReader
 
 from idbench.experiments.cli import main
-from idbench.experiments.recording.compared import difference, shift_of
+from idbench.experiments.recording.compared import difference, estimates, named_runs, shift_of
 from idbench.identify import MotionLog, TorqueChannel
 
 pytestmark = pytest.mark.thorough
@@ -30,6 +31,7 @@ def test_estimates_stand_first_then_what_differs_and_every_run_is_an_identificat
     text = chunk.to_record_batch().column("TextDocument:text").to_pylist()[0][0]
     assert text.index("**Estimates**") < text.index("timing.delay") < text.index("encoder.noise")
     assert "| ideal | delay |" in text
+    assert "| ZZR1 [kg m²] |" in text
     there = reading.entities(one)
     for name in ("ideal", "delay"):
         assert {
@@ -43,6 +45,17 @@ def test_estimates_stand_first_then_what_differs_and_every_run_is_an_identificat
     _, first = reading.column(folder / "ideal" / "recording.rrd", "q/measured")
     _, apart = reading.column(one, "difference/q/delay")
     np.testing.assert_allclose(apart, measured - first, atol=1e-12)
+
+
+def test_folders_of_table1_and_of_earlier_versions_are_compared(folder, tmp_path):
+    for name in ("one", "two"):
+        assert main(["table1", "--out", str(tmp_path / name)]) == 0
+    found = tmp_path / "two" / "summary.json"
+    summary = json.loads(found.read_text())
+    found.write_text(json.dumps({key: x for key, x in summary.items() if key != "units"}))
+    runs = named_runs([tmp_path / "one", tmp_path / "two"])
+    assert "| ZZR1 [kg m²] |" in estimates(runs)
+    assert "| ZZR1 |" in estimates(runs[::-1])
 
 
 def test_without_a_name_the_latest_is_opened(folder, monkeypatch, capsys, tmp_path):
