@@ -28,6 +28,7 @@ from idbench.identify import (
     ViscousFriction,
     idbench_chain,
     identify,
+    instants,
     paper_chain,
     scara,
 )
@@ -54,6 +55,17 @@ def test_every_model_with_every_operator_recovers_the_truth(model, operator, log
     """Noise-free: 0.01 %, but for the recursive filter, whose ripple-free stop band the others do not need."""
     chain = replace(idbench_chain(), operator=OPERATORS.create(operator))
     assert error(log, MODELS.create(model), chain, truth).max() < 0.01
+
+
+@pytest.mark.parametrize("model", ["explicit", "power"])
+@pytest.mark.parametrize("chain", CHAINS.builtin)
+def test_residuals_of_rows_need_no_columns(model, chain, log, truth):
+    """By the linearity of the chain: they are what it makes of Y - W X at every sample."""
+    made = CHAINS.create(chain)
+    signals, form = made.signals(replace(log, tau=1.1 * log.tau)), MODELS.create(model)
+    rows = made.rows(signals, scara(), form)
+    left = instants(signals, scara(), form, made, np.array(truth)).in_rows(made)
+    np.testing.assert_allclose(left, rows.Y - rows.predicted(np.array(truth)), rtol=0, atol=1e-9 * np.abs(rows.Y).max())
 
 
 @pytest.mark.parametrize("prefilter", PREFILTERS.builtin)

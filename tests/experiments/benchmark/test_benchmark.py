@@ -5,14 +5,15 @@ import shutil
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from typing import get_args, get_type_hints
 
 import numpy as np
 import pytest
 
-from idbench.experiments.benchmark.definition import SHIPPED, read_definition, shipped
+from idbench.experiments.benchmark.definition import SHIPPED, PublishedFigure, read_definition, shipped
 from idbench.experiments.benchmark.files import files_of
 from idbench.experiments.benchmark.job import set_row
-from idbench.experiments.benchmark.tables import share
+from idbench.experiments.benchmark.tables import METRICS, share
 from idbench.experiments.benchmark.tools import prepared
 from idbench.experiments.cli import main
 from idbench.identify import MotionLog, TorqueChannel
@@ -56,6 +57,10 @@ def test_published_figures_stand_beside_the_own_one_by_the_same_metric(scara_set
     said = f"torque error: idbench {own:.3g} % on the held-out logs of this set; published 7.5 % (A. Body: all of it fitted)"
     assert said in capfd.readouterr().out
     assert said in (tmp_path / "found" / "report.html").read_text()
+
+
+def test_every_metric_that_a_set_may_state_has_a_figure():
+    assert set(get_args(get_type_hints(PublishedFigure)["metric"])) == METRICS.keys()
 
 
 def test_torques_of_other_tools_are_judged_on_the_same_rows(scara_set, scara_logs, tmp_path, monkeypatch):
