@@ -55,7 +55,9 @@ def _names(every: Sequence[ReadLog]) -> list[str]:
     return [str(one.path) if alike else one.path.name for one in every]
 
 
-def load(paths: Sequence[Path], options: ReadOptions, request: Request, *, band: bool, more: int = 0) -> Loaded:
+def load(  # the last three by their names
+    paths: Sequence[Path], options: ReadOptions, request: Request, *, band: bool, more: int = 0, alike: int | None = None
+) -> Loaded:
     """Return logs of one fit.
 
     Parameters
@@ -70,14 +72,18 @@ def load(paths: Sequence[Path], options: ReadOptions, request: Request, *, band:
         Whether the band is to suit short logs.
     more : int
         Parameters that are identified beside those of the basis.
+    alike : int, optional
+        How many logs, from the first on, are of the robot without a payload: these show the delay of all. All by default.
     """
     require_different(paths)
     with stage("reading logs"):
         every = [read(file_of(path), options, request.robot_model) for path in paths]
-    return prepared(every, request, sought=delay_method(options.delay), band=band, more=more)
+    return prepared(every, request, sought=delay_method(options.delay), band=band, more=more, alike=alike)
 
 
-def prepared(every: Sequence[ReadLog], request: Request, *, sought: str | None, band: bool, more: int = 0) -> Loaded:
+def prepared(  # the last four by their names
+    every: Sequence[ReadLog], request: Request, *, sought: str | None, band: bool, more: int = 0, alike: int | None = None
+) -> Loaded:
     """Return logs of one fit that were read, with the band that suits them and, if it is sought, the delay of their torques."""
     _require_other_samples(every)
     of_band, logs = list[str](), [log for one in every for log in one.logs]
@@ -94,7 +100,8 @@ def prepared(every: Sequence[ReadLog], request: Request, *, sought: str | None, 
                 request = replace(request, method=(replace(request.processing, mask=mask), request.solver))
     if sought:
         with stage("the delay of the torques"):
-            every = with_delays(every, request, sought)
+            own = with_delays(every[:alike], request, sought)
+            every = [*own, *(late(read, own[0].channel) for read in every[len(own) :])]
     if not logs[0].poses and (simulated := SimulatedLogs.of(every, request)):  # at the delays that were found
         every = [simulated.acting(read) for read in every]
     named = zip(every, _names(every), strict=True)

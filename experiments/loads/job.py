@@ -173,10 +173,10 @@ def _loaded(asked: LoadRequest) -> tuple[LoadJudgement, tuple[str, ...]]:
     if asked.cutoff is not None:
         request = in_band(request, asked.cutoff)
     paths, band = (*asked.unloaded, *asked.log), asked.cutoff is None
-    loaded = load(paths, read_options(asked), request, band=band, more=len(LETTERS))
+    first = len(asked.unloaded)
+    loaded = load(paths, read_options(asked), request, band=band, more=len(LETTERS), alike=first or None)
     request = loaded.request
     notes = list(loaded.notes)
-    first = len(asked.unloaded)
     without, with_it = loaded.logs(slice(first)), loaded.logs(slice(first, None))
     if robot_model.laws.auto or robot_model.laws.smooth:
         request, choice = chosen_friction(request, without or with_it)

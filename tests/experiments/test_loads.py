@@ -276,3 +276,15 @@ def test_all_ways_are_compared_on_a_simulated_robot(tmp_path, monkeypatch, capsy
     summary = json.loads((tmp_path / "ways" / "summary.json").read_text())
     assert set(summary["ways"]) == set(WAYS)
     assert len(summary["ways"]["together"]["rms"]) == len(summary["ways"]["together"]["parameters"]) > 0
+
+
+def test_the_delay_is_that_of_the_logs_without_the_payload(files):
+    """Together they would be of one robot, which they are not: the delay would explain the payload."""
+    stated = payload_of(asked_of(files, torque="held", torque_delay="0"))
+    made = payload_of(asked_of(files, torque="held", torque_delay="estimate"))
+    alone, both = (one.judgement.robot for one in (stated, made))
+    found = {log.torque.delay for log in (*both.without, *both.loaded)}
+    assert len(found) == 1
+    assert abs(found.pop() - alone.without[0].torque.delay) < 1e-4
+    mass = made.leading.names.index("ML")
+    assert made.leading.sigma[mass] < 1.1 * stated.leading.sigma[mass]
