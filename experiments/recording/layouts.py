@@ -51,7 +51,7 @@ def table2(shelf: Shelf) -> Part:
     found = charts(shelf, "error [%], {1}'s steps", "processing/*", NARROW)
     signals = column(
         plot(shelf, "torque [N m], logged", "torque/log"),
-        plot(shelf, "torque [N m], true - commanded", "torque/disturbance"),
+        plot(shelf, "true - commanded [N m]", "torque/disturbance"),
     )
     left = column(side_by_side("twin", arm(shelf), signals, shares=[2, 3]), text(shelf, "table2"), shares=[3, 5])
     steps = column(*found)
