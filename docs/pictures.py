@@ -3,8 +3,8 @@
     uv run python docs/pictures.py [NAME ...] [--logs FOLDER]
 
 Every picture is a recording opened in rerun's own viewer, without a window; on a machine without a graphics card that needs a
-software Vulkan driver, such as Debian's mesa-vulkan-drivers. Names are those of CHARTS,
-PAGES, PICTURES and, with a folder of real logs, REAL; all by default.
+software Vulkan driver, such as Debian's mesa-vulkan-drivers. Names are those of CHARTS, PAGES, PICTURES and, with a folder of
+real logs, REAL; all by default.
 """
 
 import os
@@ -109,7 +109,6 @@ PAGES = {
 
 CHARTS = {"conclusion": "conclusion_tables", "benchmark": "benchmark_tables", "estimators": "estimator_tables"}
 """Pictures that are drawn from the figures in docs/results, and the module of docs/build that draws them."""
-
 
 REAL = {
     "real-log": ("log train.csv --write --force --picture real-log.png",),

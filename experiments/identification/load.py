@@ -55,7 +55,7 @@ def _names(every: Sequence[ReadLog]) -> list[str]:
     return [str(one.path) if alike else one.path.name for one in every]
 
 
-def load(  # the last three by their names
+def load(
     paths: Sequence[Path], options: ReadOptions, request: Request, *, band: bool, more: int = 0, alike: int | None = None
 ) -> Loaded:
     """Return logs of one fit.
@@ -81,7 +81,7 @@ def load(  # the last three by their names
     return prepared(every, request, sought=delay_method(options.delay), band=band, more=more, alike=alike)
 
 
-def prepared(  # the last four by their names
+def prepared(
     every: Sequence[ReadLog], request: Request, *, sought: str | None, band: bool, more: int = 0, alike: int | None = None
 ) -> Loaded:
     """Return logs of one fit that were read, with the band that suits them and, if it is sought, the delay of their torques."""

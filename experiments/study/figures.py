@@ -137,9 +137,7 @@ def bars_figure(cells: Sequence[Cell]) -> str:
     return svg(bars(names, parameters, *(100 * np.array(x) for x in numbers), runs=max(cell.runs for cell in cells)))
 
 
-def bars(  # the last by its name
-    names: Sequence[str], parameters: Sequence[str], mean: Array, spread: Array, least: Array, *, runs: int
-) -> Figure:
+def bars(names: Sequence[str], parameters: Sequence[str], mean: Array, spread: Array, least: Array, *, runs: int) -> Figure:
     """Return mean and standard deviation of errors [%], shape (method, parameter), against the least that noise allows.
 
     Of few `runs`, a standard deviation may lie below what noise allows on average. A panel reaches as far as four times the

@@ -285,6 +285,6 @@ def test_the_delay_is_that_of_the_logs_without_the_payload(files):
     alone, both = (one.judgement.robot for one in (stated, made))
     found = {log.torque.delay for log in (*both.without, *both.loaded)}
     assert len(found) == 1
-    assert abs(found.pop() - alone.without[0].torque.delay) < 1e-4
+    assert abs(found.pop() - alone.without[0].torque.delay) < 1e-4  # a fiftieth of a sample; of both logs it was milliseconds
     mass = made.leading.names.index("ML")
-    assert made.leading.sigma[mass] < 1.1 * stated.leading.sigma[mass]
+    assert made.leading.sigma[mass] < 1.1 * stated.leading.sigma[mass]  # the delay is known far better than the mass needs
