@@ -133,7 +133,7 @@ def _winners(groups: Sequence[Sequence[Cell]], best: Sequence[Cell], cells: Sequ
         sure = sum(set(names) <= set(winners) for names in rivals)
         words.append(f"below all others {f'in {sure} ' if len(groups) > 1 else ''}(p < {SURE:g})" if sure else "")
     tied = sum(len(set(names) & set(winners)) > 1 for names in rivals)
-    between = f"equal to each other{f' in {tied}' if len(groups) > 1 else ''}" if len(winners) > 1 else ""
+    between = f"not significantly different{f' in {tied}' if len(groups) > 1 else ''}" if len(winners) > 1 else ""
     return ", ".join(filter(None, words)) + (f"; {between}" if between else "")
 
 
