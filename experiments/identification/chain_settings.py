@@ -19,6 +19,7 @@ from idbench.identify import (
     SettingError,
 )
 from idbench.identify.plugins import Table, did_you_mean
+from idbench.identify.signals.filters import ButterworthPrefilter
 
 STAGES: dict[str, Table[Any]] = {
     "prefilter": PREFILTERS,
@@ -98,7 +99,7 @@ def chain_of(file: Path) -> tuple[str, Chain]:
 
 
 def with_cutoff(chain: Chain, cutoff: float) -> Chain:
-    """Return a chain with the band up to `cutoff` [Hz], its transition and its mask in the same relation to it as before.
+    """Return a chain with the band up to `cutoff` [Hz], transition, prefilter and mask in the same relation to it as before.
 
     A mask's edges must be soft for the band: a wider band lets them be steeper, and short logs lose less to them.
 
@@ -114,11 +115,12 @@ def with_cutoff(chain: Chain, cutoff: float) -> Chain:
     ratio = cutoff / chain.operator.cutoff
     for stage, setting, scale in (
         ("operator", "transition", ratio),
+        ("prefilter", "cutoff", ratio),
         ("mask", "width", 1 / ratio),
         ("mask", "taper", 1 / ratio),
     ):
         part = getattr(chain, stage)
-        if hasattr(part, setting):
+        if hasattr(part, setting) and not isinstance(part, ButterworthPrefilter):  # which has a rule of its own (section 6.2)
             chain = replaced(chain, [stage, setting], getattr(part, setting) * scale)
     found: Chain = replaced(chain, ["operator", "cutoff"], cutoff)
     return found

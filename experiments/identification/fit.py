@@ -27,6 +27,7 @@ from idbench.identify.judge.friction_choice import FrictionChoice
 from idbench.identify.judge.suspect import Suspect
 from idbench.identify.judge.torque_interval import TorqueInterval, torque_interval
 from idbench.identify.rows.rows import Rows
+from idbench.identify.signals.masks import slow_speed
 
 NOTHING = 1e-12
 """Share of a torque's squares below which its variance is rounding."""
@@ -54,8 +55,6 @@ class Fit:
     """Parameters that were left out because the logs do not show them."""
     silent: tuple[Suspect, ...] = ()
     """Joints whose torques never change though they move: they were not logged, and their rows are left out."""
-    raised: tuple[int, ...] = ()
-    """Joints whose mask was made to reach farther, since their friction in slow motion is not that of faster motion."""
 
     @property
     def robot_model(self) -> RobotModel:
@@ -87,6 +86,12 @@ class Fit:
         log, gains = self.logs.fitted[0], self.logs.gains
         return causes_of((*self.silent, *suspects), self.robot_model, log, gains)
 
+    @property
+    def masked_speeds(self) -> Array:
+        """Speed up to which each joint's mask reaches, of the fastest log, shape (joint,) [rad/s, m/s]."""
+        slow = np.max([slow_speed(signals.state.qd) for signals in self.problem.explicit.signals], axis=0)
+        return np.asarray(slow * np.maximum(self.request.mask_reach or 1.0, 1.0))
+
     @cached_property
     def truth(self) -> dict[str, float] | None:
         """The true parameters, where they are known; what the simulated robot does not have is zero."""
@@ -104,7 +109,8 @@ class Fit:
         first = self.problem.parts[0].signals
         qd = first.state.qd[(0,) * (first.state.qd.ndim - 2)]
         leading = self.estimates[self.leading]
-        return Rates.of(leading.problem.own_chain, first.fs, int(np.max(leading.row_count)), stated, source, qd)
+        chain = replace(leading.problem.own_chain, prefilter=first.prefilter)
+        return Rates.of(chain, first.fs, int(np.max(leading.row_count)), stated, source, qd)
 
     @cached_property
     def estimates(self) -> dict[str, Estimate]:
@@ -220,6 +226,7 @@ class Fit:
             "failures": self.failures,
             "hidden": list(self.hidden),
             "mask_speed": list(self.request.mask_speed),
+            "mask_reach": list(self.request.mask_reach),
             "rates": self.rates and self.rates.summary(),
             **self.robot_model.stated,
             **({"share": self.request.share} if self.request.share else {}),

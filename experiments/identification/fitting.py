@@ -6,7 +6,7 @@ import numpy as np
 
 from idbench.experiments.identification.causes import causes_of
 from idbench.experiments.identification.fit import Fit
-from idbench.experiments.identification.friction_choice import chosen_in_turns, masked_laws, suited_mask
+from idbench.experiments.identification.friction_choice import chosen_in_turns, hidden_laws
 from idbench.experiments.identification.logs import Logs
 from idbench.experiments.identification.prior_share import chosen_share
 from idbench.experiments.identification.request import Request
@@ -21,6 +21,7 @@ from idbench.identify import (
 )
 from idbench.identify.data.motion_log import never_logged
 from idbench.identify.judge.diagnosis import diagnosed, silent_joint, still_joints, unlogged
+from idbench.identify.judge.mask_choice import suited_reach
 from idbench.identify.judge.stretches import held_out_errors
 from idbench.identify.judge.suspect import Suspect
 
@@ -45,11 +46,11 @@ def fit(request: Request, logs: Logs) -> Fit:
     if request.robot_model.share_sought:
         request = replace(request, share=chosen_share(request, logs.fitted))
     problem = request.problem(logs.fitted)
-    (speeds, raised), masked = suited_mask(problem), list[str]()
-    if raised:
-        request, before = replace(request, mask_speed=speeds), problem
+    masked = list[str]()
+    if reach := suited_reach(problem):
+        request, before = replace(request, mask_reach=reach), problem
         problem = request.problem(logs.fitted)
-        if masked := list(masked_laws(before, problem)):
+        if masked := list(hidden_laws(before, problem)):
             request = replace(request, robot_model=request.robot_model.without(masked))
             problem = request.problem(logs.fitted)
     found, silent = _shown(request, logs, problem), list[Suspect]()
@@ -61,7 +62,7 @@ def fit(request: Request, logs: Logs) -> Fit:
     leading = next(iter(found.outcomes.values()))
     if not found.estimates and isinstance(leading, IdentificationError):
         raise _with_its_cause(found, leading)
-    return replace(found, choice=choice, hidden=(*masked, *found.hidden), raised=raised, silent=tuple(silent))
+    return replace(found, choice=choice, hidden=(*masked, *found.hidden), silent=tuple(silent))
 
 
 def _shown(request: Request, logs: Logs, problem: Problem) -> Fit:

@@ -10,45 +10,25 @@ import numpy as np
 from idbench.experiments.identification.friction_laws import COMPARED, law_of
 from idbench.experiments.identification.logs import Logs
 from idbench.experiments.identification.request import Request
-from idbench.identify import ESTIMATORS, IdentificationError, MotionLog, Problem, ReversalMask
+from idbench.identify import MotionLog, Problem
 from idbench.identify.arrays import TINY
 from idbench.identify.basis.block import Parameter
 from idbench.identify.basis.friction.shape import ShapedFriction
 from idbench.identify.basis.of_joints import OfJoints
 from idbench.identify.blame import blamed
 from idbench.identify.estimators.settle import settled
-from idbench.identify.judge.band import slow_motion
 from idbench.identify.judge.friction_choice import FrictionChoice, choose_friction
 from idbench.identify.models import ExplicitModel
 from idbench.identify.rows.rows import Rows
-from idbench.identify.signals.masks import NoMask, most_masked
+from idbench.identify.signals.masks import NoMask
 from idbench.identify.telling import stage
 
 SHOWN = 0.02
 """Share of the largest entry of a law's column that a mask must leave for the rows to show the law."""
 
 
-def suited_mask(problem: Problem) -> tuple[tuple[float, ...], tuple[int, ...]]:
-    """Return speeds of the mask that suit the logs, and the joints of which they are higher than usual.
-
-    Neither, if the speeds are given, nothing is masked, or nothing can be estimated, which the fit says.
-    """
-    mask = problem.chain.mask
-    if not isinstance(mask, ReversalMask) or mask.threshold is not None:
-        return (), ()
-    try:
-        explicit = problem.explicit
-        speed, factor = slow_motion(explicit, ESTIMATORS.create("WLS").fit(explicit).X)
-    except IdentificationError:
-        return (), ()
-    most = np.max([most_masked(signals.state.qd) for signals in explicit.signals], axis=0)
-    reach = np.maximum(np.minimum(speed * factor, most), speed)
-    raised = tuple(int(j) for j in np.flatnonzero(reach > speed))
-    return (tuple(reach.tolist()), raised) if raised else ((), ())
-
-
-def masked_laws(before: Problem, after: Problem) -> tuple[str, ...]:
-    """Return the parameters of laws that act in slow motion only, where a mask that reaches farther takes all that.
+def hidden_laws(before: Problem, after: Problem) -> tuple[str, ...]:
+    """Parameters of laws that act in slow motion only, where a mask that reaches farther takes all that.
 
     Stribeck friction that no row shows could have any size, and would be added to the torque of slow motion.
     """

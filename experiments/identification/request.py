@@ -66,7 +66,8 @@ class Request:
     mask_speed: tuple[float, ...] = ()
     """Speeds up to which joints count as standing or turning, of all or of each [rad/s, m/s]; by default they follow the
     log."""
-
+    mask_reach: tuple[float, ...] = ()
+    """Reach of the mask of each joint (`ReversalMask.reach`), as the logs decide; without it all have the short mask."""
     smooth: tuple[float, ...] = ()
     """Standard deviations of the smooth functions of friction, joint by joint [N m]; by default a tenth of the rms torques."""
     wdyn: tuple[float, str] | None = None
@@ -103,7 +104,8 @@ class Request:
         chain = self.method[0] if self.method else CHAINS.create(self.chain)
         if isinstance(chain.mask, ReversalMask):
             couplings = tuple(c.weights for c in self.robot_model.tree.couplings)
-            mask = replace(chain.mask, couplings=couplings, threshold=self.mask_speed or chain.mask.threshold)
+            threshold, reach = self.mask_speed or chain.mask.threshold, self.mask_reach or chain.mask.reach
+            mask = replace(chain.mask, couplings=couplings, threshold=threshold, reach=reach)
             chain = replace(chain, mask=mask)
         return chain if self.trim is None else replace(chain, trim=self.trim)
 

@@ -124,10 +124,11 @@ def _told(fit: Fit) -> Iterator[str]:
         yield words
     yield from _rotors(fit)
     yield from words_of_iterations(fit)
-    if fit.raised:
-        joints, speeds = fit.robot_model.robot.joints, fit.request.mask_speed
-        each = ", ".join(f"{joints[j]} up to {speeds[j]:.2g} {fit.robot_model.units(j)[1]}/s" for j in fit.raised)
-        yield f"slow motion is masked, because its friction differs from that of faster motion: {each} (--mask-speed)"
+    if fit.request.mask_reach:
+        joints, speeds = fit.robot_model.robot.joints, fit.masked_speeds
+        wide = [j for j, reach in enumerate(fit.request.mask_reach) if reach]
+        each = ", ".join(f"{joints[j]} up to {speeds[j]:.2g} {fit.robot_model.units(j)[1]}/s" for j in wide)
+        yield f"slow motion is masked, because the rest predicts held-out stretches better without it: {each} (--mask-speed)"
     if fit.request.smooth:
         sizes = " ".join(f"{x:.2g}" for x in fit.request.smooth)
         unit = ", ".join(dict.fromkeys(fit.robot_model.units(j)[0] for j in range(fit.basis.n)))

@@ -1,6 +1,6 @@
 """What a planned motion tells of the parameters, from few states, with its slope."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -42,7 +42,7 @@ def predicted_information(log: MotionLog, basis: Basis, X: Array, levels: NoiseL
     IdentificationError
         If the log is too short for the chain.
     """
-    signals = chain.signals(log)
+    signals = replace(chain.signals(log), prefilter=chain.prefilter)  # as for the noisy log that the motion will have
     linear = Linearization(signals, basis, np.broadcast_to(X, (*log.q.shape[:-2], len(X))))
     rows = chain.rows(signals, basis, ExplicitModel())
     noisy, lead = NoisyRows(rows.maps[0], linear), (*log.q.shape[:-2], log.n)

@@ -195,7 +195,7 @@ Piece = tuple[Chain, MotionLog, tuple[int, int]]
 
 def pieces(chain: Chain, logs: Sequence[MotionLog]) -> list[Piece]:
     """Return every piece of logs, each with the chain whose mask is suited to the whole log."""
-    suited = [replace(chain, mask=chain.mask.suited(_speeds(log, chain))) for log in logs]
+    suited = [_suited(chain, log) for log in logs]
     each = zip(suited, logs, strict=True)
     return [(own, log, piece) for own, log in each for piece in own.pieces(log, piece_of(log))]
 
@@ -214,7 +214,8 @@ def bias_counts(parts: Sequence[LogRows], names: tuple[str, ...], share: float) 
     return not (np.abs(plain.solution(known) - better.solution(known)) < MOVED * sigma).all()
 
 
-def _speeds(log: MotionLog, chain: Chain) -> Array:
-    """Return the velocities of a log, shape (joint, time), without anything else that its signals keep."""
-    q = chain.prefilter.apply(np.ascontiguousarray(np.swapaxes(log.q, -1, -2)), log.fs)
-    return chain.differentiator.derivative(q, log.fs)
+def _suited(chain: Chain, log: MotionLog) -> Chain:
+    """The chain with prefilter and mask that suit a whole log, without anything else that its signals keep."""
+    prefilter = chain.suited_prefilter(log)
+    q = prefilter.apply(np.ascontiguousarray(np.swapaxes(log.q, -1, -2)), log.fs)
+    return replace(chain, prefilter=prefilter, mask=chain.mask.suited(chain.differentiator.derivative(q, log.fs)))

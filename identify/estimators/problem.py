@@ -189,7 +189,8 @@ class Problem:
         """The white noise of torques and positions, from their differences; it is what `Estimate.noise_sigma` contains."""
         if self.explicit is not self:
             return self.explicit.noise
-        return replace(self.likely_noise, torque=torque_noise(self.signals, self.likely_noise.torque))
+        level = np.maximum(torque_noise(self.signals, self.likely_noise.torque), self._resolution)
+        return replace(self.likely_noise, torque=level)
 
     @cached_property
     def likely_noise(self) -> NoiseLevels:
@@ -198,7 +199,12 @@ class Problem:
             return self.explicit.likely_noise
         rows, noisy = zip(*((part.unbiased, part.noisy) for part in self.parts), strict=True)
         begin = residual_level(rows, noisy, self.some_rows.factors, self.start.X)
-        return likely_levels(rows, noisy, NoiseLevels(begin, self.position_noise, self.repeats))
+        return likely_levels(rows, noisy, NoiseLevels(begin, self.position_noise, self.repeats), self._resolution)
+
+    @cached_property
+    def _resolution(self) -> Array:
+        """Standard deviation of the rounding of the torques [N m], shape (..., joint)."""
+        return count_noise(self.logs, "tau")
 
     @cached_property
     def alike(self) -> bool:
@@ -251,8 +257,9 @@ class Problem:
             )
         if weights not in ("measured", "own"):
             raise IdentificationError(f"weights = {weights!r} is none of 'measured', 'own'")
-        measured = self.signals if weights == "measured" else [None] * len(logs)
-        signals = [self.chain.signals(one, given) for one, given in zip(logs, measured, strict=True)]
+        signals = [self.chain.signals(one, given) for one, given in zip(logs, self.signals, strict=True)]
+        if weights == "own":
+            signals = [replace(one, weights_of=None) for one in signals]
         return Rows.stack([self.rows_of(one) for one in signals])
 
     def with_model(self, model: AbstractModel) -> "Problem":

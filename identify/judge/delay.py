@@ -1,16 +1,17 @@
 """The delay of a log's torque, from the log alone."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 
 from idbench.identify.arrays import Array
 from idbench.identify.basis.basis import Basis
 from idbench.identify.data.motion_log import MotionLog, TorqueChannel
 from idbench.identify.errors import ExcitationError, LogError, RangeError, SettingError
-from idbench.identify.estimators.log_rows import DELAY_STEP
 from idbench.identify.estimators.problem import Problem
+from idbench.identify.judge.leave_out import Stretches, left_out
 from idbench.identify.minimum import minimum
 from idbench.identify.models import ExplicitModel
 from idbench.identify.rows.chain import Chain, idbench_chain
@@ -25,14 +26,11 @@ WIDER, FARTHEST = 3.0, 0.6
 SHARE = 0.05
 """Share of a log that a delay may be: its rows must lie inside the log at all delays."""
 
-STEPS = 2
-"""Steps of the generalized least squares in which the delay is a parameter."""
-
 ROUNDS, SETTLED = 10, 0.1
-"""Steps at most in which each joint's is, and share of a sigma by which the last one may move them: 1 % of sigma^2."""
+"""Newton steps at most, and share of a sigma below which the last one must be: 1 % of sigma^2."""
 
-BLOCKS = 16
-"""Stretches of the log of which each is left out once, to see how much the delay depends on it."""
+DIFFERENT = 0.01
+"""Probability, of logs with one delay, below which their delays count as different."""
 
 _COARSE = 15
 """Delays of a first look, which brackets the smallest misfit."""
@@ -49,6 +47,8 @@ class DelayEstimate:
     out."""
     lags: tuple[float, ...] = ()
     """What each joint is late beyond the delay [s], if each has its own."""
+    of_logs: tuple[float, ...] = ()
+    """Delay of each log [s], where they differ significantly; `sigma` contains their scatter."""
 
     def of(self, channel: TorqueChannel) -> TorqueChannel:
         """Return a channel with this delay."""
@@ -67,9 +67,10 @@ class DelayEstimate:
     @property
     def words(self) -> str:
         """It and its sigma in words."""
-        return (
-            f"{self.of(TorqueChannel('held')).late}, sigma {', '.join(f'{1e3 * x:.2g}' for x in np.atleast_1d(self.sigma))} ms"
-        )
+        sigma = ", ".join(f"{1e3 * x:.2g}" for x in np.atleast_1d(self.sigma))
+        each = ", ".join(f"{1e3 * x:.3g}" for x in self.of_logs)
+        differ = f"; the logs differ: {each} ms, identify them one by one" if each else ""
+        return f"{self.of(TorqueChannel('held')).late}, sigma {sigma} ms{differ}"
 
 
 def estimate_delay(
@@ -81,9 +82,13 @@ def estimate_delay(
     """Return the delay with which the explicit model explains the torques best.
 
     A search over delays, by the likelihood of Gaussian noise with a level of its own for each joint, brackets the best one; it
-    goes farther as long as that lies at an end. The delay is then a parameter beside the others in generalized least squares:
+    goes farther as long as that lies at an end. The delay is then a parameter beside the others in generalized least squares,
 
-        [X; delta] = argmin (Y - W X - d delta)' C^-1 (Y - W X - d delta),   d = dY/d(delay)
+        [X; delta] = argmin (Y + d delta - W X)' C^-1 (Y + d delta - W X),   d = dY/d(delay)
+
+    repeated from what was found, with C of the noise there, until a step is below a tenth of its sigma: what is late counts as
+    noise, and weights of a wrong delay keep it wrong. Logs whose own delays differ significantly are reported, and sigma
+    contains their scatter.
 
     Parameters
     ----------
@@ -147,23 +152,26 @@ def estimate_joint_delays(
     """
     common = estimate_delay(log, basis, chain, within)
     logs = manageable([log] if isinstance(log, MotionLog) else list(log))
+    chain = chain or idbench_chain()
     try:
-        Problem(tuple(logs), basis, ExplicitModel(), chain or idbench_chain()).rows.factors.together.check()
+        Problem(tuple(logs), basis, ExplicitModel(), chain).rows.factors.together.check()
     except ExcitationError as error:
         basis = _without_hidden(basis, error)
-    delays, sigma = np.full(basis.n, common.delay), np.zeros(basis.n)
-    for _ in range(ROUNDS):
+    problem = Problem(tuple(logs), basis, ExplicitModel(), chain)
+
+    def of(delays: Array) -> DelayEstimate:
         mean = float(delays.mean())
-        found = DelayEstimate(mean, tuple(sigma.tolist()), tuple((delays - mean).tolist()))
-        delayed = [replace(one, torque=found.of(one.torque)) for one in logs]
-        problem = Problem(tuple(delayed), basis, ExplicitModel(), chain or idbench_chain())
-        steps, whole = _steps_of(problem, each=True)
-        shown = np.isfinite(whole)  # not of a joint without torque
-        delays, sigma = delays + np.where(shown, whole, 0.0), np.where(shown, _jackknife(steps), 0.0)
-        if (np.abs(whole[shown]) < SETTLED * sigma[shown]).all():
-            return replace(found, sigma=tuple(sigma.tolist()))
+        return DelayEstimate(mean, 0.0, tuple((delays - mean).tolist()))
+
+    delays, sigma, settled = _newton(
+        lambda delays: _delayed(problem, of(delays)),
+        np.full(basis.n, common.delay),
+        lambda each: [np.stack(part.delay_slopes(each=True), axis=-1) for part in each.parts],
+    )
+    if settled:
+        return replace(of(delays), sigma=tuple(sigma.tolist()))
     raise RangeError(
-        "the delays of the joints do not settle: does the model fit the robot? `estimate` finds one delay for all joints"
+        "the delays of the joints do not converge: does the model fit the robot? `estimate` finds one delay for all joints"
     )
 
 
@@ -175,23 +183,110 @@ def _without_hidden(basis: Basis, error: ExcitationError) -> Basis:
 
 
 def nearby_delay(problem: Problem) -> DelayEstimate:
-    """Return the delay by one step of generalized least squares from the stated one, near which it must be.
+    """The delay by one step of generalized least squares from the stated one, near which it must be.
 
     Parameters
     ----------
     problem : Problem
         Logs with one torque channel, and their rows.
     """
-    steps, (whole,) = _steps_of(problem.explicit, each=False)
-    return DelayEstimate(problem.logs[0].torque.delay + float(whole), float(_jackknife(steps)[0]))
+    (step,), (sigma,) = delay_step(problem.explicit, _slopes(problem.explicit))
+    return DelayEstimate(problem.logs[0].torque.delay + float(step), float(sigma))
 
 
-def _steps_of(problem: Problem, each: bool) -> tuple[Array, Array]:
-    """Return steps of the delay, or of each joint's, without each block of rows, and of all: Y + D delta = W X."""
-    D = [np.stack(part.delay_slopes(each), axis=-1) for part in problem.parts]
-    parts = zip(problem.parts, D, strict=True)
-    A = _white(problem, [np.column_stack([part.unbiased.W, -slopes, part.rows.Y]) for part, slopes in parts])
-    return _left_out(A[:, :-1], A[:, -1], D[0].shape[-1])
+def torque_lateness(problem: Problem, j: int, late: float) -> float:
+    """How late the torque of a joint is [s], by Newton steps from about where it is.
+
+    Parameters
+    ----------
+    problem : Problem
+        The explicit model, whose rows are kept.
+    j : int
+        The joint, from 0.
+    late : float
+        Lateness to first order [s].
+    """
+
+    def earlier(late: Array) -> Problem:
+        lags = [np.array(log.torque.lags or np.zeros(log.n)) - float(late[0]) * np.eye(log.n)[j] for log in problem.logs]
+        each = zip(problem.logs, lags, strict=True)
+        return problem.with_logs([replace(log, torque=replace(log.torque, lags=tuple(x.tolist()))) for log, x in each])
+
+    found, _, _ = _newton(
+        earlier, np.array([late]), lambda each: [-part.delay_slopes(each=True)[j][:, None] for part in each.parts]
+    )
+    return float(found[0])
+
+
+def _newton(
+    delayed: Callable[[Array], Problem],
+    delays: Array,
+    slopes: Callable[[Problem], list[Array]],
+    within: tuple[float, float] = (-np.inf, np.inf),
+) -> tuple[Array, Array, bool]:
+    """Delays after Newton steps, their standard errors, and whether the last step was small; none goes beyond a range."""
+    for _ in range(ROUNDS):
+        problem = delayed(delays)
+        step, sigma = delay_step(problem, slopes(problem))
+        if not ((within[0] <= delays + step) & (delays + step <= within[1])).all():
+            return delays, sigma, False
+        delays = delays + step
+        if (np.abs(step) <= SETTLED * sigma).all():
+            return delays, sigma, True
+    return delays, sigma, False
+
+
+def delay_step(problem: Problem, slopes: Sequence[Array]) -> tuple[Array, Array]:
+    """Newton step of delays and its standard error, which the jackknife over stretches shows, shape (k,) each [s].
+
+        [X; delta] = argmin (Y + D delta - W X)' C^-1 (Y + D delta - W X)
+
+    Parameters
+    ----------
+    problem : Problem
+        The explicit model, whose rows are kept.
+    slopes : sequence of Array, shape (r, k)
+        D = dY/d(delays) of the rows of each log [N m/s]; a column of zeros gives a step of zero.
+    """
+    parts, stretches = problem.parts, Stretches.of(problem.parts)
+    rows = [
+        part.whitening.whiten(np.column_stack([part.unbiased.W, -D, part.rows.Y]))
+        for part, D in zip(parts, slopes, strict=True)
+    ]
+    found = left_out(stretches.products(parts, rows))[:, -slopes[0].shape[-1] :]
+    return found[-1], jackknife(found[:-1])
+
+
+def jackknife(found: Array) -> Array:
+    """Standard deviations of what is estimated without each stretch, shape (stretch, k)."""
+    count = len(found)
+    return np.asarray(np.sqrt((count - 1) / count * np.sum((found - found.mean(axis=0)) ** 2, axis=0)))
+
+
+def _slopes(problem: Problem) -> list[Array]:
+    """Derivatives of the rows of each log by one delay of all, shape (r, 1)."""
+    return [part.delay_slopes(each=False)[0][:, None] for part in problem.parts]
+
+
+def _delayed(problem: Problem, found: DelayEstimate) -> Problem:
+    return problem.with_logs([replace(log, torque=replace(found.of(log.torque), delay_sigma=0.0)) for log in problem.logs])
+
+
+def _with_scatter(problem: Problem, found: DelayEstimate) -> DelayEstimate:
+    """The delay, with that of each log where they differ (Cochran's test), and their scatter in sigma (DerSimonian, Laird)."""
+    slopes = _slopes(problem)
+    own = [np.pad(D, [(0, 0), (k, len(slopes) - 1 - k)]) for k, D in enumerate(slopes)]
+    step, sigma = delay_step(problem, own)
+    shown = sigma > 0
+    w, freedom = 1 / sigma[shown] ** 2, int(np.count_nonzero(shown)) - 1
+    if freedom < 1:
+        return found
+    Q = float(w @ (step[shown] - w @ step[shown] / w.sum()) ** 2)
+    if float(scipy.special.chdtrc(freedom, Q)) > DIFFERENT:
+        return found
+    scatter = (Q - freedom) / (w.sum() - (w @ w) / w.sum())
+    sigma_of_all = float(np.sqrt(np.square(found.sigma) + scatter))
+    return replace(found, sigma=sigma_of_all, of_logs=tuple((found.delay + step).tolist()))
 
 
 def _is_read(logs: Sequence[MotionLog], chain: Chain) -> bool:
@@ -223,26 +318,17 @@ class _Search:
         return self._refined(minimum(self._misfit, low, high, 1e-7), (low, high))
 
     def _refined(self, delay: float, within: tuple[float, float]) -> DelayEstimate:
-        """Return the delay as a parameter, delta(k+1) = delta(k) + its GLS step, and its jackknife's standard deviation.
+        """The delay by Newton steps from that of the search, or that of the search where a step leaves its bracket.
 
-        Rows are weighted by the noise at the delay of the search: at the stated one, what is late would count as noise. If the
-        steps leave the bracket of the search, which they do where the model is far off, it is the search's.
+        Steps leave it where the model is far off.
         """
-        self._problem = replace(self._problem, logs=self._delayed(delay))
-        found, W = delay, _white(self._problem, [part.unbiased.W for part in self._problem.parts])
-        for _ in range(STEPS):
-            steps, (whole,) = self._step(found, W)
-            if not within[0] <= found + whole <= within[1]:
-                return DelayEstimate(delay, float(_jackknife(self._step(delay, W)[0])[0]))
-            found += whole
-        return DelayEstimate(float(found), float(_jackknife(steps)[0]))
-
-    def _step(self, delay: float, W: Array) -> tuple[Array, Array]:
-        """Return the step of the delay without each block, and of all: Y(delay + delta) = Y + d delta = W X."""
-        Y, slope = self._at(delay).Y, (self._at(delay + DELAY_STEP).Y - self._at(delay - DELAY_STEP).Y) / (2 * DELAY_STEP)
-        ends = np.cumsum([len(part.rows.time) for part in self._problem.parts])[:-1]
-        last = _white(self._problem, np.split(np.stack([-slope, Y], axis=1), ends))
-        return _left_out(np.concatenate([W, last[:, :1]], axis=1), last[:, 1], 1)
+        found, sigma, settled = _newton(
+            lambda delay: replace(self._problem, logs=self._delayed(float(delay[0]))), np.array([delay]), _slopes, within
+        )
+        if not settled:
+            return DelayEstimate(delay, float(sigma[0]))
+        estimate = DelayEstimate(float(found[0]), float(sigma[0]))
+        return estimate if len(self._logs) == 1 else _with_scatter(_delayed(self._problem, estimate), estimate)
 
     def _at(self, delay: float) -> Rows:
         """Return the rows at a delay, of which Y alone depends on it."""
@@ -256,29 +342,3 @@ class _Search:
 
     def _misfit(self, delay: float) -> float:
         return float(self._at(delay).factors.misfit())
-
-
-def _white(problem: Problem, each: Sequence[Array]) -> Array:
-    """Return columns of the rows of each log, made independent, of the rows that are not void."""
-    parts = zip(problem.parts, each, strict=True)
-    return np.concatenate([part.whitening.whiten(x)[part.rows.valid] for part, x in parts])
-
-
-def _jackknife(steps: Array) -> Array:
-    """Return the standard deviations of what is estimated with each block left out, shape (block, k)."""
-    return np.asarray(np.sqrt((BLOCKS - 1) / BLOCKS * np.sum((steps - steps.mean(axis=0)) ** 2, axis=0)))
-
-
-def _left_out(A: Array, y: Array, last: int) -> tuple[Array, Array]:
-    """Return the `last` unknowns of A x = y, by least squares, with each block of rows left out, and of all rows."""
-    block, scale = np.arange(len(A)) * BLOCKS // len(A), np.linalg.norm(A, axis=0)
-    A = A / np.where(scale > 0, scale, 1.0)
-    squares = np.array([A[block == b].T @ A[block == b] for b in range(BLOCKS)])
-    products = np.array([A[block == b].T @ y[block == b] for b in range(BLOCKS)])
-    left = np.concatenate([squares.sum(axis=0) - squares, squares.sum(axis=0, keepdims=True)])
-    x = (
-        np.linalg.pinv(left, hermitian=True)
-        @ np.concatenate([products.sum(axis=0) - products, products.sum(axis=0, keepdims=True)])[..., None]
-    )
-    found = x[:, -last:, 0] / np.where(scale[-last:] > 0, scale[-last:], np.nan)
-    return found[:-1], found[-1]

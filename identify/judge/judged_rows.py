@@ -6,7 +6,6 @@ from typing import final
 import numpy as np
 
 from idbench.identify.arrays import Array
-from idbench.identify.data.motion_log import MotionLog
 from idbench.identify.estimators.problem import Problem
 from idbench.identify.judge.residuals import Instants
 from idbench.identify.models import ExplicitModel
@@ -91,12 +90,12 @@ def row_noise(left: Instants, signals: Signals, chain: Chain) -> Array:
     Array
         NaN where too little lies above the band: sampling is slow, or the operator is no low-pass.
     """
-    log, fs = signals.log, signals.fs
+    fs = signals.fs
     length = min(left.residual.shape[-1], round(fs / RESOLUTION))
     f, S = welch(left.residual * left.weight, fs, length)
     S = S / np.maximum(np.mean(left.weight**2, axis=-1, keepdims=True), 1e-300)
     passed = gain_of(chain.operator.response(fs), f, fs)
-    kinds = np.stack([gain_of(impulse, f, fs) ** 2 for impulse in _impulses(log, chain)])
+    kinds = np.stack([gain_of(impulse, f, fs) ** 2 for impulse in _impulses(signals, chain)])
     above = (passed < QUIET * passed[0]) & (f > f[np.argmax(passed < QUIET * passed[0])]) & (f < 0.95 * fs / 2)
     above &= (kinds > FAINT * kinds.max(axis=1, keepdims=True)).any(axis=0)
     if np.count_nonzero(above) < MIN_FREQUENCIES:
@@ -105,11 +104,11 @@ def row_noise(left: Instants, signals: Signals, chain: Chain) -> Array:
     return np.sqrt(np.trapezoid(levels @ kinds * passed**2, f, axis=-1))
 
 
-def _impulses(log: MotionLog, chain: Chain) -> tuple[Array, Array]:
+def _impulses(signals: Signals, chain: Chain) -> tuple[Array, Array]:
     """Return what an impulse of the torque, and one of the position, leave in the torque's residual."""
-    fs = log.fs
+    log, fs = signals.log, signals.fs
     x = np.zeros(2 * int(np.ceil(chain.halo(fs, log.torque) * fs)) + 101)
     x[len(x) // 2] = 1.0
-    x = chain.prefilter.apply(x, fs)
+    x = signals.prefilter.apply(x, fs)
     position = chain.differentiator.derivative(chain.differentiator.derivative(x, fs), fs)
     return chain.alignment.align(x[None], replace(log.torque, lags=()), fs).mean[0], position

@@ -10,7 +10,7 @@ import scipy
 from idbench.identify.arrays import TINY, Array
 from idbench.identify.errors import IdentificationError
 from idbench.identify.estimators.problem import Problem
-from idbench.identify.judge.lateness import torque_lateness
+from idbench.identify.judge.delay import torque_lateness
 from idbench.identify.judge.mistake_rows import Candidate, MistakeRows, held_torque
 from idbench.identify.judge.mistakes import COLLISION, GAIN
 from idbench.identify.judge.stretches import errors_of_stretches, scatter_of_sums

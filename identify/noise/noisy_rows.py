@@ -13,10 +13,7 @@ from idbench.identify.noise.band_matrix import BandMatrix
 from idbench.identify.noise.covariance import BandedCovariance, Whitening
 from idbench.identify.noise.linearization import Linearization
 from idbench.identify.noise.propagation import NoiseLevels, Paths, position_paths, torque_paths
-from idbench.identify.rows.row_map import RowMap
-
-SEEN = 0.05
-"""Share of a row's variance that the mask must leave: of the edge of a mask alone, variance and model are not known well."""
+from idbench.identify.rows.row_map import RowMap, in_order
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,9 +37,8 @@ class NoisyRows:
 
     @cached_property
     def kept(self) -> npt.NDArray[np.bool_]:
-        """Which rows the mask leaves enough of, shape (..., r)."""
-        one = np.ones(self.to_rows.signals.log.n)
-        return np.asarray(self.torque.variance(one) > SEEN * self.unmasked.torque.variance(one))
+        """Which rows are not void, shape (..., r)."""
+        return in_order(self.to_rows.outside) > 0
 
     def covariance(self, levels: NoiseLevels) -> BandedCovariance:
         """Return the covariance that noise of these levels gives the rows."""

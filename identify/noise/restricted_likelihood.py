@@ -41,7 +41,9 @@ SMALLEST = 1e-9
 """Noise of positions [rad] at least: rounding, of a log in single precision."""
 
 
-def likely_levels(parts: Sequence[Rows], noisy: Sequence[NoisyRows], start: NoiseLevels) -> NoiseLevels:
+def likely_levels(
+    parts: Sequence[Rows], noisy: Sequence[NoisyRows], start: NoiseLevels, resolution: Array | float = 0.0
+) -> NoiseLevels:
     """Return the noise of logs, the torques' by restricted maximum likelihood (REML) of the rows of the explicit model.
 
     The covariance of rows is C = sum of sigma_i^2 C_i over the torques and positions of all joints. The noise of positions is
@@ -60,12 +62,14 @@ def likely_levels(parts: Sequence[Rows], noisy: Sequence[NoisyRows], start: Nois
         How noise reaches them.
     start : NoiseLevels
         Where the torques begin, NaN in runs that cannot be solved; the positions.
+    resolution : Array, shape (..., joint), optional
+        Standard deviation of the rounding of the torques, below which their noise cannot be [N m].
     """
     units = [each.units for each in noisy]
     joined = [rows.joined * each.kept[..., None] for rows, each in zip(parts, noisy, strict=True)]
     tau = [each.to_rows.signals.torque.mean for each in noisy]
     rms = np.sqrt(sum(np.mean(one**2, axis=-1) for one in tau) / len(parts))
-    least = np.maximum(EXACT * rms, 1e-12) ** 2
+    least = np.maximum(np.maximum(EXACT * rms, resolution), 1e-12) ** 2
     torque = np.where(np.isfinite(start.torque), np.maximum(start.torque, LOWEST * rms), start.torque)
     position = np.broadcast_to(np.maximum(start.position, SMALLEST), torque.shape)
     squares = likely(units, joined, np.nan_to_num(torque**2), least, position**2)

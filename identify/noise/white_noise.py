@@ -129,12 +129,12 @@ def white_noise(logs: Sequence[Signals], logged: Literal["q", "tau"]) -> Array:
     return np.where(np.asarray(count)[0] >= MIN_SAMPLES, used, changing)
 
 
-def count_noise(logs: Sequence[MotionLog]) -> Array:
-    """Return the standard deviation of rounding to an encoder's step [rad], shape (..., joint); 0 where positions have none."""
-    q = np.concatenate([log.q for log in logs], axis=-2)
-    found = np.zeros((*q.shape[:-2], q.shape[-1]))
-    for run in np.ndindex(q.shape[:-2]):  # each by itself, or its bits would depend on the others
-        found[run] = np.nan_to_num(encoder_steps(q[run])) / np.sqrt(12)
+def count_noise(logs: Sequence[MotionLog], logged: Literal["q", "tau"] = "q") -> Array:
+    """Standard deviation of rounding to the step of positions [rad], or torques [N m], shape (..., joint); 0 without a step."""
+    x = np.concatenate([log.q if logged == "q" else log.tau * np.asarray(log.torque.gain) for log in logs], axis=-2)
+    found = np.zeros((*x.shape[:-2], x.shape[-1]))
+    for run in np.ndindex(x.shape[:-2]):  # each by itself, or its bits would depend on the others
+        found[run] = np.nan_to_num(encoder_steps(x[run])) / np.sqrt(12)
     return found
 
 

@@ -6,6 +6,7 @@ from typing import final
 
 import numpy as np
 
+from idbench.identify.arrays import Array
 from idbench.identify.basis.basis import Basis
 from idbench.identify.data.motion_log import MotionLog, TorqueChannel
 from idbench.identify.errors import LogError, SettingError, require_not_negative
@@ -21,6 +22,7 @@ from idbench.identify.signals.filters import (
     AbstractPrefilter,
     ButterworthPrefilter,
     CentralDifference,
+    NoisePrefilter,
     NoPrefilter,
 )
 from idbench.identify.signals.masks import AbstractMask, NoMask, ReversalMask
@@ -52,8 +54,19 @@ class Chain:
             require_not_negative(trim=self.trim)
 
     def signals(self, log: MotionLog, weights_of: Signals | None = None) -> Signals:
-        """Return the signals of `log`, with the mask's weights of other signals if they are given."""
-        return Signals(log, self.prefilter, self.differentiator, self.alignment, self.mask, weights_of)
+        """Return the signals of `log`, with prefilter and mask's weights of other signals if they are given."""
+        prefilter = self.suited_prefilter(log) if weights_of is None else weights_of.prefilter
+        return Signals(log, prefilter, self.differentiator, self.alignment, self.mask, weights_of)
+
+    def suited_prefilter(self, log: MotionLog) -> AbstractPrefilter:
+        """The prefilter, suited to the noise of a log."""
+        if log.poses:
+            return self.prefilter
+
+        def velocities() -> Array:
+            return self.differentiator.derivative(np.ascontiguousarray(np.swapaxes(log.q, -1, -2)), log.fs)
+
+        return self.prefilter.suited(velocities, log.fs)
 
     def grid(self, log: MotionLog) -> Grid:
         """Return where the rows of `log` lie; raise LogError if it leaves none, SettingError if a setting does not fit it."""
@@ -73,13 +86,16 @@ class Chain:
         if log.n != basis.n:
             hint = "; its axes are (time, joint), is it transposed?" if log.samples == basis.n else ""
             raise LogError(f"the log has {log.n} joints, the basis {basis.n}{hint}")
-        _ = self.grid(log)  # too short a log is refused before it is differentiated
+        _ = self._grid_of(signals)  # too short a log is refused before it is differentiated
         equations = model.equations(basis, signals)
         return Rows.of(equations, self.map(equations))
 
     def map(self, equations: Equations) -> RowMap:
         """Return how samples become the rows of a model's equations."""
-        return self.operator.map(equations, equations.weight, self.grid(equations.signals.log))
+        return self.operator.map(equations, equations.weight, self._grid_of(equations.signals))
+
+    def _grid_of(self, signals: Signals) -> Grid:
+        return replace(self, prefilter=signals.prefilter).grid(signals.log)
 
     def pieces(self, log: MotionLog, samples: int) -> list[tuple[int, int]]:
         """Return first sample and end of pieces of a log, each with the samples that its rows look at.
@@ -108,7 +124,7 @@ class Chain:
         """Return the time at either end of `log` that makes no rows [s]; raise SettingError if `trim` is too short."""
         if log.poses:
             return 0.0
-        halo = self.halo(log.fs, log.torque)
+        halo = replace(self, prefilter=self.suited_prefilter(log)).halo(log.fs, log.torque)
         if self.trim is None:
             return halo
         if self.trim < halo:
@@ -128,13 +144,13 @@ def paper_chain() -> Chain:
 
 
 def idbench_chain() -> Chain:
-    """No prefilter, 6th-order differences, torque aligned by its channel, reversals masked, FIR low-pass."""
-    return Chain(NoPrefilter(), CentralDifference(6), ByChannel(), ReversalMask(), FirLowPass())
+    """Noisy positions low-passed, 6th-order differences, torque aligned by its channel, reversals masked, FIR low-pass."""
+    return Chain(NoisePrefilter(), CentralDifference(6), ByChannel(), ReversalMask(), FirLowPass())
 
 
 def paper_masked_chain() -> Chain:
     """The paper's own steps, with the instants near reversals and standstill left out, as its school does."""
-    return replace(paper_chain(), mask=ReversalMask(SCHOOL))
+    return replace(paper_chain(), mask=ReversalMask(SCHOOL, 0.03, 0.1))
 
 
 def unfiltered_chain() -> Chain:

@@ -11,6 +11,7 @@ import scipy
 from idbench.identify.arrays import Array
 from idbench.identify.errors import SettingError, require_not_negative, require_positive
 from idbench.identify.plugins import Table
+from idbench.identify.signals.filters import NOISY, SLOW, velocity_noise
 
 
 class AbstractMask(ABC):
@@ -46,41 +47,18 @@ class NoMask(AbstractMask):
         return np.ones_like(qd)
 
 
-SLOW = 0.05
-"""Share of a joint's rms speed up to which it counts as turning: 0.1 rad/s of the SCARA's 2 rad/s."""
-
 MIN_SPEED = 1e-12
 """Speed below which there is none."""
 
-NOISY = 4.0
-"""Standard deviations of the noise of velocities up to which their sign is not known."""
-
-THIRD = 3
-"""Order of the differences of velocities in which motion vanishes beside noise."""
-
-QUIET = 0.8
-"""Quantile of the absolute third differences of velocities that measures their noise: most of any motion is smooth."""
+WIDE = (1.0, 10 / 3)
+"""Width and taper of a wide mask, in tapers of a short one: 30 and 100 ms of 30 ms. Differences look 30 ms across a kink; edges
+of 100 ms keep the noise of encoder counts out of the band without a prefilter."""
 
 
 def slow_speed(qd: Array) -> Array:
-    """Return the speed up to which a joint rests or reverses, from velocities of shape (..., time): of its own, above noise."""
-    rms = np.sqrt(np.mean(qd**2, axis=-1))
-    if qd.shape[-1] <= THIRD:
-        return np.maximum(SLOW * rms, MIN_SPEED)
-    kinks = np.abs(np.diff(qd, THIRD, axis=-1))
-    size = scipy.special.ndtri((1 + QUIET) / 2) * np.sqrt(scipy.special.comb(2 * THIRD, THIRD))
-    noise = np.quantile(kinks, QUIET, axis=-1) / size
-    return np.maximum(np.minimum(np.maximum(SLOW * rms, NOISY * noise), most_masked(qd)), MIN_SPEED)
-
-
-def most_masked(qd: Array) -> Array:
-    """Return the speed that half of a joint's moving time is below, of velocities (..., time): no mask takes more."""
-    speed = np.abs(qd)
-    moving = speed > np.maximum(SLOW * np.sqrt(np.mean(qd**2, axis=-1, keepdims=True)), MIN_SPEED)
-    ordered = np.sort(np.where(moving, speed, -1.0), axis=-1)
-    count = np.count_nonzero(moving, axis=-1)
-    place = np.clip(qd.shape[-1] - 1 - count // 2, 0, qd.shape[-1] - 1)
-    return np.asarray(np.take_along_axis(ordered, place[..., None], axis=-1)[..., 0])
+    """Speed up to which a joint rests or reverses, from velocities of shape (..., time): of its own, above noise [rad/s]."""
+    own = SLOW * np.sqrt(np.mean(qd**2, axis=-1))
+    return np.maximum(np.maximum(own, NOISY * velocity_noise(qd)), MIN_SPEED)
 
 
 @final
@@ -89,16 +67,20 @@ class ReversalMask(AbstractMask):
     """Leaves out the instants at which a joint rests or reverses, where its friction is not Fs sign(qd) + Fv qd.
 
     The weights rise gradually: a weight that jumps would mix the noise of differentiated encoder counts, which lies at high
-    frequencies, into the pass band of the operator.
+    frequencies, into the pass band of the operator. After a prefilter short edges serve, and keep the samples near reversals,
+    which show friction best on slow robots. Of joints with strong stiction they spoil the rest: `reach`.
     """
 
     threshold: float | tuple[float, ...] | Array | None = None
     """A joint rests or reverses while |qd| is at most this [rad/s, of slides m/s], of all joints or of each, and where the sign
     of qd changes, shape (..., joint), optional. By default it follows each joint's own speeds and their noise: `slow_speed`."""
-    width: float = 0.03
-    """The instants this close [s] to such a one are left out as well: as far as differences look across the kink."""
-    taper: float = 0.1
+    width: float = 0.0
+    """The instants this close [s] to such a one are left out as well."""
+    taper: float = 0.03
     """Time [s] over which the weight then rises from 0 to 1, and falls."""
+    reach: tuple[float, ...] = ()
+    """Joints that need a wide mask (`WIDE`): multiple of the threshold up to which they are left out, shape (joint,); 0 of a
+    joint with the short mask, which all have by default."""
     couplings: tuple[tuple[float, ...], ...] = ()
     """Of drives whose motor turns with several joints, what it turns for a turn of each: where it rests or reverses these
     joints are left out as well."""
@@ -107,10 +89,13 @@ class ReversalMask(AbstractMask):
         for value in () if self.threshold is None else np.ravel(self.threshold):
             require_positive(threshold=float(value))
         require_not_negative(width=self.width, taper=self.taper)
+        for value in self.reach:
+            require_not_negative(reach=value)
 
     def halo(self, fs: float) -> float:
         """Return the width, the taper, and the sample next to them."""
-        return (self._reach(fs) + 2 * self._half(fs) + 1) / fs
+        edges = [(self.width, self.taper), *([self._wide] if any(self.reach) else [])]
+        return max((_samples(width, fs) + 2 * _half(taper, fs) + 1) / fs for width, taper in edges)
 
     def suited(self, qd: Array) -> Self:
         """Return this mask with the slow speeds of a motion, where nothing else is said."""
@@ -118,14 +103,22 @@ class ReversalMask(AbstractMask):
 
     def weight(self, qd: Array, fs: float) -> Array:
         """Return 1 where the joint moves, 0 where it rests or reverses, and what is between near there."""
-        slow = self._slow(qd)
-        weight = self._weight(qd, slow, fs)
+        slow, edges = self._slow(qd), (self.width, self.taper)
+        weight = _weight(qd, slow, edges, fs)
+        if any(self.reach):
+            reach = np.array(self.reach)
+            weight = np.where(reach[:, None] > 0, _weight(qd, slow * np.maximum(reach, 1.0), self._wide, fs), weight)
         for coupling in self.couplings:
             turns = np.array(coupling)[:, None]
             motor = np.sum(turns * qd, axis=-2, keepdims=True)
             least = np.max(np.abs(turns[:, 0]) * slow, axis=-1, keepdims=True)
-            weight = np.where(turns != 0, np.minimum(weight, self._weight(motor, least, fs)), weight)
+            weight = np.where(turns != 0, np.minimum(weight, _weight(motor, least, edges, fs)), weight)
         return weight
+
+    @property
+    def _wide(self) -> tuple[float, float]:
+        """Width and taper of the wide mask [s]."""
+        return WIDE[0] * self.taper, WIDE[1] * self.taper
 
     def _slow(self, qd: Array) -> Array:
         """Return the speed up to which each joint rests or reverses, shape (..., joint)."""
@@ -134,23 +127,27 @@ class ReversalMask(AbstractMask):
             raise SettingError(f"{len(threshold)} speeds of a mask for {qd.shape[-2]} joints: give one, or one each")
         return np.broadcast_to(threshold, qd.shape[:-1])
 
-    def _weight(self, qd: Array, slow: Array, fs: float) -> Array:
-        slides = np.abs(qd) > slow[..., None]
-        turns = np.signbit(qd[..., 1:]) != np.signbit(qd[..., :-1])  # a fast joint turns between two samples
-        slides[..., 1:] &= ~turns
-        slides[..., :-1] &= ~turns
-        half = self._half(fs)
-        wide = _eroded(slides.astype(np.float64), self._reach(fs) + half)
-        rise = np.hanning(2 * half + 3)[1:-1]
-        smooth = scipy.ndimage.convolve1d(wide, rise / rise.sum(), axis=-1, mode="nearest")
-        # Sums of the weights leave some 1e-17 where all are zero, or not quite 1 where all are one.
-        return np.where(smooth < 1e-12, 0.0, np.minimum(smooth, 1.0))
 
-    def _reach(self, fs: float) -> int:
-        return ceil(self.width * fs - 1e-9)  # 0.03 s at 100 Hz are 3 samples, whatever the rounding of the product
+def _weight(qd: Array, slow: Array, edges: tuple[float, float], fs: float) -> Array:
+    """Weights of the instants, with edges of some width and taper [s]."""
+    slides = np.abs(qd) > slow[..., None]
+    turns = np.signbit(qd[..., 1:]) != np.signbit(qd[..., :-1])  # a fast joint turns between two samples
+    slides[..., 1:] &= ~turns
+    slides[..., :-1] &= ~turns
+    half = _half(edges[1], fs)
+    wide = _eroded(slides.astype(np.float64), _samples(edges[0], fs) + half)
+    rise = np.hanning(2 * half + 3)[1:-1]
+    smooth = scipy.ndimage.convolve1d(wide, rise / rise.sum(), axis=-1, mode="nearest")
+    # Sums of the weights leave some 1e-17 where all are zero, or not quite 1 where all are one.
+    return np.where(smooth < 1e-12, 0.0, np.minimum(smooth, 1.0))
 
-    def _half(self, fs: float) -> int:
-        return round(self.taper * fs / 2)
+
+def _samples(width: float, fs: float) -> int:
+    return ceil(width * fs - 1e-9)  # 0.03 s at 100 Hz are 3 samples, whatever the rounding of the product
+
+
+def _half(taper: float, fs: float) -> int:
+    return round(taper * fs / 2)
 
 
 def _eroded(weight: Array, reach: int) -> Array:

@@ -76,6 +76,8 @@ class GeneralizedLeastSquares(AbstractEstimator):
         R = problem.independent_factor
         known = None if problem.prior is None else prior_rows(problem.prior, R, np.ones(R.shape[:-2]))
         factor = Factor(R, problem.factors.together.rows, problem.names, known)
+        if R.ndim == 2 and problem.factors.together.status == Status.OK:
+            factor.check()  # without what noise adds to W, less may be determined
         solvable = (problem.factors.together.status == Status.OK) & factor.determined
         inverse = factor.inverse(solvable)
         return Estimate(problem, frozen(factor.solution(solvable)), frozen(inverse), OfWhitenedRows(inverse, known))

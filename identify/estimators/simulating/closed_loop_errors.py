@@ -33,10 +33,9 @@ class ClosedLoopInputError(AbstractSimulating):
         require_explicit(problem, "CLIE", "torques", "; DIDIM has all")
 
         def torques(logs: tuple[MotionLog, ...]) -> Array:
-            maps = problem.rows.maps
+            each = zip(problem.rows.maps, logs, strict=True)
             return np.concatenate(
-                [part.measurement(problem.chain.signals(log).torque.mean) for part, log in zip(maps, logs, strict=True)],
-                axis=-1,
+                [part.measurement(problem.chain.signals(log, part.signals).torque.mean) for part, log in each], axis=-1
             )
 
         rounds, kinds = self.begun(problem), Kinds.of_rows(problem)

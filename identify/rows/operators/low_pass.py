@@ -16,6 +16,9 @@ from idbench.identify.rows.row_map import Grid, Kernel, RowMap, Window
 from idbench.identify.signals.filters import forward_backward, settling_time
 from idbench.identify.signals.spectra import windowed_sinc
 
+SEEN = 0.05
+"""Share of a row's variance that the mask must leave: of the edge of a mask alone, variance and model are not known well."""
+
 
 class AbstractOperator(ABC):
     """A linear operator that turns B tau = [c + s e] X into rows of Y = W X + rho.
@@ -66,11 +69,11 @@ class AbstractLowPass(AbstractOperator):
 
     @final
     def map(self, equations: Equations, weight: Array, grid: Grid) -> RowMap:
-        """Return f_p of w B tau and of w (c + s e); a row is void if all it looks at is masked."""
+        """Return f_p of w B tau and of w (c + s e); a row is void if the mask leaves at most `SEEN` of its variance."""
         fs = equations.signals.fs
-        reach = ceil(self.halo(fs) * fs - 1e-9)
-        seen = Kernel(np.ones(2 * reach + 1), reach, grid).apply(weight)
-        valid = (seen > 0).astype(np.float64)
+        squares = self.response(fs) ** 2
+        seen = Kernel(squares, (len(squares) - 1) // 2, grid).apply(weight**2)
+        valid = (seen > SEEN * squares.sum()).astype(np.float64)
         return RowMap(equations.signals, equations.B, grid, self.window(fs, grid), None, weight, valid, self.response(fs))
 
 

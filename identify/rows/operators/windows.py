@@ -9,7 +9,7 @@ import numpy as np
 from idbench.identify.arrays import Array
 from idbench.identify.errors import SettingError, require_positive, require_whole
 from idbench.identify.models import Equations
-from idbench.identify.rows.operators.low_pass import AbstractLowPass, AbstractOperator
+from idbench.identify.rows.operators.low_pass import SEEN, AbstractLowPass, AbstractOperator
 from idbench.identify.rows.row_map import Grid, Kernel, RowMap, Window
 
 
@@ -66,14 +66,14 @@ class AbstractWeakForm(AbstractOperator):
 
     @final
     def map(self, equations: Equations, weight: Array, grid: Grid) -> RowMap:
-        """Return the integrals, weighted; a row is void if its stretch touches a masked instant."""
+        """Return the integrals, weighted; a row is void if its stretch touches a masked instant, or at most `SEEN` is left."""
         kernels = self.kernels(equations.signals.fs)
         length = len(kernels.integral)
         before = (length - 1) // 2
         integral, derivative = (Kernel(kernel, before, grid) for kernel in kernels)
         touched = Kernel(np.ones(length), before, grid).apply((weight == 0).astype(np.float64))
         mean = Kernel(np.full(length, 1 / length), before, grid).apply(weight)
-        outside = mean * (touched == 0)
+        outside = mean * ((touched == 0) & (mean**2 > SEEN))
         ones, by_parts = np.ones_like(weight), derivative if equations.differentiates else None
         return RowMap(equations.signals, equations.B, grid, integral, by_parts, ones, outside, kernels.integral)
 

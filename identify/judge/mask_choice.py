@@ -1,0 +1,46 @@
+"""Which joints need a wide mask, decided by the logs."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from idbench.identify.estimators.problem import Problem
+from idbench.identify.judge.leave_out import Stretches
+from idbench.identify.judge.used_rows import UsedRows, squares_left_out
+from idbench.identify.signals.masks import ReversalMask
+
+REACHES = (2.0, 4.0)
+"""Wide masks that are compared with the short one, in multiples of the slow speed: up to a fifth of the rms speed. A KUKA
+KR300 takes 4 in most joints; 1 was never best there, nor on UR10e, TX40 and Baxter."""
+
+SHARE = 0.05
+"""Share of a joint's squared error that a wide mask must take to be chosen: they take 10 to 85 % in five joints of a KR300, at
+most 3 % on a UR10e, a TX40 and a Baxter."""
+
+
+def suited_reach(problem: Problem) -> tuple[float, ...]:
+    """Reach of the mask of each joint (`ReversalMask.reach`); empty where the short mask suits all.
+
+    Near reversals the friction of joints with strong stiction is not Fs sign(qd), and rows there spoil the rest; on slow robots
+    they are the most informative of all. Each mask is judged by predictions of stretches that were left out, on all rows of
+    moving joints, where the written function is used: a wide mask must predict them better than the short one.
+
+    Raises
+    ------
+    IdentificationError
+        If the rows do not determine the parameters.
+    """
+    explicit, mask = problem.explicit, problem.chain.mask
+    if not isinstance(mask, ReversalMask) or mask.threshold is not None or problem.logs[0].poses:
+        return ()
+    explicit.factors.together.check()
+    used, stretches = UsedRows.of(explicit), Stretches.of(explicit.parts)
+    best = squares_left_out(explicit, used, stretches)
+    reach = np.zeros(problem.basis.n)
+    for wide in REACHES:
+        chain = replace(problem.chain, mask=replace(mask, reach=(wide,) * problem.basis.n))
+        squares = squares_left_out(replace(explicit, chain=chain, _signals=(), _explicit=None), used, stretches)
+        for j in range(problem.basis.n):
+            if squares[:, j].sum() < (1 - SHARE) * best[:, j].sum():
+                best[:, j], reach[j] = squares[:, j], wide
+    return tuple(reach.tolist()) if reach.any() else ()
