@@ -75,8 +75,9 @@ def _made_of(fit: Fit, parameter: Parameter) -> dict[str, float]:
 
 
 def interval_of(fit: Fit, model: str) -> dict[str, list[float]]:
-    """Return the half widths of the torques' intervals, and the fitted speeds and torques; NaN where they are not known."""
+    """Return the half widths of the torques' intervals, the fitted speeds and torques, and the band [Hz]; NaN if not known."""
     interval, nothing = fit.torque_intervals[model], [nan] * fit.basis.n
     if interval is None:
-        return dict.fromkeys(("half", "speed", "torque"), nothing)
-    return {name: getattr(interval, name).tolist() for name in ("half", "speed", "torque")}
+        return dict.fromkeys(("half", "speed", "torque"), nothing) | {"band": [nan]}
+    each = {name: getattr(interval, name).tolist() for name in ("half", "speed", "torque")}
+    return each | {"band": [interval.band]}

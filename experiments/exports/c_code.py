@@ -92,7 +92,7 @@ struct {name}_parameters {{
 }}
 
 {declared}
-/* Half widths of 95 % intervals of the torques [N m], for motions like those of the fit. */
+/* Half widths of 95 % intervals of the torques up to {content.interval["band"][0]:g} Hz [N m], within the speeds of the fit. */
 void {name}_torque_interval(const struct {name}_parameters *p, {name}_real *half);
 /* Number of joints that are faster, or have a larger torque, than in 99 % of the fit. */
 int {name}_outside_fit(const {name}_real *q, const {name}_real *qd, const {name}_real *qdd, const struct {name}_parameters *p);

@@ -12,7 +12,6 @@ from idbench.experiments.identification.consistent_estimate import drawn_about
 from idbench.experiments.identification.fit import Fit
 from idbench.experiments.judgement.held_out import HeldOut, on_log
 from idbench.identify import Array, Estimate, IdentificationError, MotionLog
-from idbench.identify.judge.torque_interval import LITTLE
 from idbench.identify.telling import stage
 from idbench.sim.engine.driven import shoot
 from idbench.sim.errors import BenchError
@@ -201,7 +200,7 @@ class Ensemble:
             off, outside = rows.by_kind(rows.Y - np.sum(rows.W * self.estimate.X, axis=-1)), rows.maps[0].outside
             time = rows.by_kind(rows.time)[0]
             filled = np.zeros(off.shape)
-            for j, (own, kept) in enumerate(zip(off, outside > LITTLE, strict=True)):
+            for j, (own, kept) in enumerate(zip(off, outside > 0, strict=True)):
                 if kept.any():  # across reversals, which are left out, as beside them
                     filled[j] = np.interp(time, time[kept], own[kept] / outside[j, kept])
             found.append((time, filled))

@@ -52,8 +52,9 @@ IDENTIFIED = Parameters(
 )
 SIGMA = {sigma}
 
-# Of each joint: half widths of 95 % intervals of the torques, and speeds and torques that 99 % of the fit stayed below.
+# Of each joint: half widths of 95 % intervals of the torques up to BAND [Hz]; 99 % of the fit's speeds and torques are smaller.
 HALF_WIDTHS = {half}
+BAND, = {band}
 FITTED_SPEEDS = {speed}
 FITTED_TORQUES = {torque}
 
@@ -62,8 +63,13 @@ FITTED_TORQUES = {torque}
 
 TAIL = '''
 def torque_interval(q, qd, qdd):
-    """Return half widths of 95 % intervals of the torques [N m], shape (..., {n}): see `outside_fit`."""
-    return _called(lambda f, p, *motion: HALF_WIDTHS, ({n},), None, (q, qd, qdd))
+    """Return half widths of 95 % intervals of the torques up to BAND [N m], shape (..., {n}); nan where a joint is too fast."""
+
+    def half(f, p, q, qd, qdd):
+        each = zip(qd, HALF_WIDTHS, FITTED_SPEEDS)
+        return [f.where(f.abs(v) > speed, math.nan, width) for v, width, speed in each]
+
+    return _called(half, ({n},), None, (q, qd, qdd))
 
 
 def outside_fit(q, qd, qdd, p=IDENTIFIED):

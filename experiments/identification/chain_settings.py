@@ -19,7 +19,7 @@ from idbench.identify import (
     SettingError,
 )
 from idbench.identify.plugins import Table, did_you_mean
-from idbench.identify.signals.filters import ButterworthPrefilter
+from idbench.identify.signals.prefilters import ButterworthPrefilter
 
 STAGES: dict[str, Table[Any]] = {
     "prefilter": PREFILTERS,

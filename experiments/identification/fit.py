@@ -208,6 +208,7 @@ class Fit:
             models[name]["explained_share"] = [finite(x) for x in share]
         for name, interval in self.torque_intervals.items():
             models[name]["torque_interval"] = None if interval is None else [finite(x) for x in interval.half]
+            models[name]["torque_interval_band"] = None if interval is None else interval.band
         delay, cutoff = self.delay, getattr(self.processing.operator, "cutoff", None)
         return {
             "parameters": list(self.basis.names),

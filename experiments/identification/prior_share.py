@@ -6,13 +6,11 @@ import numpy as np
 
 from idbench.experiments.identification.request import Request
 from idbench.identify import Array, IdentificationError, MotionLog, estimate
-from idbench.identify.rows.factors import Factor, prior_rows, triangular
+from idbench.identify.estimators.leave_out import Stretches, left_out
+from idbench.identify.rows.factors import prior_rows, triangular
 
 SHARES = tuple(10 ** (-k / 4) for k in range(-4, 7))
 """Relative changes of links that are tried: from ten times to 3 %."""
-
-BLOCKS = 5
-"""Stretches of the rows, each of which is predicted from the others."""
 
 
 def chosen_share(request: Request, logs: Sequence[MotionLog]) -> float | None:
@@ -25,21 +23,18 @@ def chosen_share(request: Request, logs: Sequence[MotionLog]) -> float | None:
         found = estimate(problem, request.solver)
     except IdentificationError:
         return None
-    rows = found.independent_rows()
-    if rows is None or rows.ndim > 2:
+    rows = None if found.solution is None else found.solution.independent(problem.parts)
+    if rows is None or rows[0].ndim > 2:
         return None
-    blocks = [triangular(block) for block in np.array_split(rows, BLOCKS)]
-    return min(SHARES, key=lambda share: _error(request, blocks, share))
+    products, R = Stretches.of(problem.parts).products(problem.parts, rows), triangular(np.concatenate(rows))
+    return min(SHARES, key=lambda share: _error(request, products, R, share))
 
 
-def _error(request: Request, blocks: Sequence[Array], share: float) -> float:
-    """Return the sum of squared errors of the blocks, with a share."""
-    prior, p = request.robot_model.prior(share), blocks[0].shape[-1] - 1
+def _error(request: Request, products: Array, R: Array, share: float) -> float:
+    """Sum of squared errors of the stretches, with a share."""
+    prior = request.robot_model.prior(share)
     assert prior is not None
-    total = 0.0
-    for k, block in enumerate(blocks):
-        R = triangular(np.concatenate([*blocks[:k], *blocks[k + 1 :]]))
-        factor = Factor(R, np.array(len(R)), ("",) * p, prior_rows(prior, R, np.ones(())))
-        X = factor.solution(np.array(factor.determined))
-        total += float(np.sum((block[:, :p] @ X - block[:, p]) ** 2))
+    X = left_out(products, prior_rows(prior, R, np.ones(()))[()])[:-1]
+    x = np.concatenate([X, -np.ones((len(X), 1))], axis=1)
+    total = float(np.einsum("bi,bij,bj->", x, products, x))
     return total if np.isfinite(total) else np.inf

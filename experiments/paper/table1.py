@@ -122,7 +122,9 @@ class Table1:
         """Sampling and filter frequencies of each chain, in multiples of what the motion has of the loop's bandwidth."""
         log, qd = self.log, self.reference.qd.T
         rows = {name: int(found["explicit"].row_count) for name, found in self.estimates.items()}
-        return {name: Rates.of(CHAINS.create(name), log.fs, rows[name], None, "from the motion", qd) for name in self.chains}
+        made = {name: CHAINS.create(name) for name in self.chains}
+        chains = {name: replace(chain, prefilter=chain.suited_prefilter(log)) for name, chain in made.items()}
+        return {name: Rates.of(chain, log.fs, rows[name], None, "from the motion", qd) for name, chain in chains.items()}
 
     def summary(self) -> dict[str, Any]:
         """Return summary.json: `models` holds the last of the chains, `<name>_chain` the others."""

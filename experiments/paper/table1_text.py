@@ -21,12 +21,11 @@ from idbench.identify import (
     Estimate,
     NoPrefilter,
     OrdinaryLeastSquares,
-    ReversalMask,
     identify_each,
     paper_chain,
     scara,
 )
-from idbench.identify.rows.chain import SCHOOL
+from idbench.identify.rows.chain import paper_masked_chain
 
 OVER = {"energy": "power", "integral": "implicit"}
 """Models that are others, integrated."""
@@ -41,7 +40,7 @@ def _unfiltered(chain: Chain) -> Chain:
 
 
 def _masked(chain: Chain) -> Chain:
-    return replace(chain, mask=ReversalMask(SCHOOL))
+    return replace(chain, mask=paper_masked_chain().mask)
 
 
 CHANGES: dict[str, tuple[Callable[[Chain], Chain], ...]] = {

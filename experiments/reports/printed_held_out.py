@@ -85,13 +85,11 @@ def _interval_words(one: HeldOut, model: str, inside: Array, outside: float) -> 
     worst = f", of {joints[int(share.argmin())]} {100 * share.min():.0f} %" if len(joints) > 1 else ""
     expected = 2 * (1 - MOST) * len(joints)  # of speeds and torques
     words = (
-        f"{100 * LEVEL:.0f} % intervals of the torque, +- {half} {unit}: they contain {100 * np.nanmean(inside):.0f} %{worst}"
+        f"{100 * LEVEL:.0f} % intervals of the torque up to {interval.band:g} Hz, +- {half} {unit}: they contain "
+        f"{100 * np.nanmean(inside):.0f} %{worst}"
     )
-    return (
-        f"{words}; {100 * outside:.0f} % of the motion is outside the fitted speeds and torques"
-        if outside > 2 * expected
-        else words
-    )
+    beyond = f"{100 * outside:.0f} % of the motion is outside the fitted speeds and torques, where no interval holds"
+    return f"{words}; {beyond}" if outside > 2 * expected else words
 
 
 def _alike(verdicts: Mapping[str, tuple[str, ...]]) -> dict[tuple[str, ...], list[str]]:

@@ -21,12 +21,14 @@ from idbench.identify import (
     Estimate,
     ExplicitModel,
     IdentificationError,
+    MotionLog,
     Problem,
     Simulation,
     Status,
     attempt_each,
 )
 from idbench.identify.estimators.settle import settled
+from idbench.identify.signals.prefilters import AbstractPrefilter, NoisePrefilter
 from idbench.sim.engine.run import Run, ideal_run
 from idbench.sim.engine.simulation import Progress, simulate
 from idbench.sim.errors import BenchError
@@ -153,34 +155,59 @@ def _identify(
     simulation: Simulation,
 ) -> Iterator[dict[str, Any]]:
     """Yield a row for every run and model."""
-    found = dict[str, Estimate | IdentificationError]()
-    chain = _trimmed(study, method, simulated)
+    for places in _alike(study, method, simulated, len(runs)):
+        own = {name: x[places] for name, x in bounds.items()}
+        begin = simulation.start if simulation.start is None or simulation.start.ndim < 2 else simulation.start[places]
+        logs = [simulated.log.run(([k * len(runs) + i for i in places],)) for k in range(study.most_logs)]
+        found = _outcomes(study, method, simulated, logs, replace(simulation, start=begin))
+        for model in study.models:
+            outcome = found[model]
+            columns = _columns(outcome, truth, own) if isinstance(outcome, Estimate) else {}
+            for place, i in enumerate(places):
+                common = _common(study, method, runs[i], model, simulated.seeds[i])
+                ends = (simulated.failures.get(i + k * len(runs)) for k in range(study.logs_of(model)))
+                if reason := next(filter(None, ends), None) or _failure(outcome, place):
+                    yield common | {"failure": reason}
+                else:
+                    yield common | {name: values[place] for name, values in columns.items()}
+
+
+def _outcomes(
+    study: Study, method: Method, simulated: Run, logs: Sequence[MotionLog], simulation: Simulation
+) -> dict[str, Estimate | IdentificationError]:
+    """What each model gives of some runs."""
+    found, chain = dict[str, Estimate | IdentificationError](), _trimmed(study, method, simulated)
     for count in dict.fromkeys(map(study.logs_of, study.models)):
         models = {name: model for name, model in study.created_models.items() if study.logs_of(name) == count}
-        logs = tuple(simulated.log.run((slice(k * len(runs), (k + 1) * len(runs)),)) for k in range(count))
+        basis = study.subjects[method.friction].basis
         try:
-            problem = settled(Problem(logs, study.subjects[method.friction].basis, ExplicitModel(), chain, simulation))
+            problem = settled(Problem(tuple(logs[:count]), basis, ExplicitModel(), chain, simulation))
             found |= attempt_each(problem, models, method.estimator, throw=False)
         except IdentificationError as error:
             found |= dict.fromkeys(models, error)
-    for model in study.models:
-        outcome = found[model]
-        columns = _columns(outcome, truth, bounds) if isinstance(outcome, Estimate) else {}
-        for i, run in enumerate(runs):
-            common = _common(study, method, run, model, simulated.seeds[i])
-            ends = (simulated.failures.get(i + k * len(runs)) for k in range(study.logs_of(model)))
-            if reason := next(filter(None, ends), None) or _failure(outcome, i):
-                yield common | {"failure": reason}
-            else:
-                yield common | {name: values[i] for name, values in columns.items()}
+    return found
+
+
+def _alike(study: Study, method: Method, simulated: Run, runs: int) -> list[list[int]]:
+    """Places of runs whose logs get the same prefilters: each is identified as if it were alone.
+
+    Estimators that simulate robots take all runs at once, and the prefilter that the noisiest of them needs.
+    """
+    groups: dict[tuple[AbstractPrefilter, ...], list[int]] = defaultdict(list)
+    if {"loop", "plant"} & method.estimator.needs or not isinstance(method.chain.prefilter, NoisePrefilter):
+        return [list(range(runs))]
+    for i in range(runs):
+        logs = (simulated.log.run((k * runs + i,)) for k in range(study.most_logs))
+        groups[tuple(map(method.chain.suited_prefilter, logs))].append(i)
+    return list(groups.values())
 
 
 def _trimmed(study: Study, method: Method, simulated: Run) -> Chain:
     """Return the chain of a method; if models are to have equal numbers of rows, with the longest margin of all of them."""
     if study.rows == "own" or method.chain.trim is not None:
         return method.chain
-    fs, torque = simulated.log.fs, simulated.log.torque
-    return replace(method.chain, trim=max(method.chain.of_model(m).halo(fs, torque) for m in study.created_models.values()))
+    models = study.created_models.values()
+    return replace(method.chain, trim=max(method.chain.of_model(m).margin(simulated.log) for m in models))
 
 
 def _simulation(

@@ -201,7 +201,7 @@ class MotionLog:
         q, tau, *others = (x[..., first:end, :] for x in (self.q, self.tau, *self.conditions.values()))
         return replace(self, q=q, tau=tau, conditions=dict(zip(self.conditions, others, strict=True)))
 
-    def run(self, i: tuple[int | slice, ...]) -> "MotionLog":
+    def run(self, i: tuple[int | slice | list[int], ...]) -> "MotionLog":
         """Return one of independent runs, or some of them, as a log of its own."""
         conditions = {name: x[i] if x.ndim > 2 else x for name, x in self.conditions.items()}
         return replace(self, q=self.q[i], tau=self.tau[i], conditions=conditions)

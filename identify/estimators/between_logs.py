@@ -21,10 +21,6 @@ class BetweenLogs(NamedTuple):
     logs: int
     """Number of logs that determine all parameters by themselves."""
 
-    def of_all(self, usual: Array) -> Array:
-        """Return the variance of what all logs give together, shape (p,); that `usual` of friction counts as one more log."""
-        return ((self.logs - (usual > 0)) * self.variance + usual) / self.logs**2
-
 
 def between_logs(parts: Sequence[LogRows], solution: OfWeightedRows | OfWhitenedRows) -> BetweenLogs | None:
     """Return the scatter of parameters between the logs of a fit; None unless two of them determine all parameters.
@@ -51,8 +47,8 @@ def between_logs(parts: Sequence[LogRows], solution: OfWeightedRows | OfWhitened
             continue
         alone = G @ precision @ factor.inverse(factor.determined)
         X.append(factor.solution(factor.determined))
-        error = ModelError.of([part], X[-1], [alone], 1.0)
-        C.append(np.diagonal(part.covariance.of_sums(alone) + error.covariance))
+        noise = part.covariance.of_sums(alone)
+        C.append(np.diagonal(noise + ModelError.of([part], X[-1], [alone], 1.0, np.diagonal(noise)).covariance))
     if len(X) < 2:
         return None
     x, w = np.array(X), 1 / np.maximum(C, TINY)

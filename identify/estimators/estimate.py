@@ -176,13 +176,13 @@ class Estimate:
 
     @cached_property
     def model_error(self) -> ModelError | None:
-        """The error of X due to the model, from residuals beyond noise; None where it is not known how X follows from rows."""
+        """The error of X due to the model, beyond that of noise; None where it is not known how X follows from rows."""
         if self.solution is None:
             return None
-        parts = self.problem.parts
-        found = ModelError.of(parts, self.X, self.solution.influence(parts), self.problem.share, pieces=self.problem.long)
-        usual = found.changes(self.problem.basis.parameters, self.X)
-        return replace(found, scatter=usual if self.between_logs is None else self.between_logs.of_all(usual))
+        parts, noise = self.problem.parts, np.diagonal(self.noise_covariance, axis1=-2, axis2=-1)
+        found = ModelError.of(parts, self.X, self.solution.influence(parts), self.problem.share, noise)
+        between = self.between_logs
+        return found if between is None else replace(found, scatter=between.variance / between.logs)
 
     @cached_property
     def between_logs(self) -> BetweenLogs | None:

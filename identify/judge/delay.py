@@ -10,8 +10,8 @@ from idbench.identify.arrays import Array
 from idbench.identify.basis.basis import Basis
 from idbench.identify.data.motion_log import MotionLog, TorqueChannel
 from idbench.identify.errors import ExcitationError, LogError, RangeError, SettingError
+from idbench.identify.estimators.leave_out import Stretches, left_out
 from idbench.identify.estimators.problem import Problem
-from idbench.identify.judge.leave_out import Stretches, left_out
 from idbench.identify.minimum import minimum
 from idbench.identify.models import ExplicitModel
 from idbench.identify.rows.chain import Chain, idbench_chain

@@ -12,6 +12,8 @@ from idbench.identify.basis.block import AbstractBlock
 from idbench.identify.basis.friction.shape import ShapedFriction
 from idbench.identify.basis.joint_law import AbstractFriction
 from idbench.identify.basis.of_joints import OfJoints
+from idbench.identify.estimators.leave_out import NOTHING, RIDGE
+from idbench.identify.estimators.leave_out import solved as solution
 from idbench.identify.estimators.problem import Problem
 from idbench.identify.estimators.settle import Candidates
 from idbench.identify.rows.factors import Status
@@ -29,11 +31,8 @@ FAST = 0.8
 """Speeds of a joint above this share of the rows are predicted once more, by a fit of the slower ones: a law that holds within
 the speeds of a fit alone fails there."""
 
-TINY, NOTHING = 1e-300, 1e-200
-"""Squares below the first count as this, and columns whose squares are below the second as none."""
-
-RIDGE = 1e-11
-"""Share of its diagonal that a matrix of products may lack before columns count as dependent."""
+TINY = 1e-300
+"""Squares below this count as it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,12 +148,8 @@ def _held(joined: Array, speed: Array) -> Array:
 
 
 def solved(products: Array, columns: Sequence[int]) -> Array:
-    """Return the least-squares solution from products of columns."""
-    A, b = products[np.ix_(columns, columns)], products[columns, -1]
-    scale = np.sqrt(np.maximum(np.diagonal(A), NOTHING))
-    A = A / np.outer(scale, scale) + RIDGE * np.eye(len(columns))
-    found: Array = np.linalg.solve(A, b / scale) / scale
-    return found
+    """Least-squares solution from products of some columns."""
+    return solution(products[np.ix_([*columns, -1], [*columns, -1])])
 
 
 def sigma_squares(products: Array, judged: Array, columns: Sequence[int]) -> float:

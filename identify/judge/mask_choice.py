@@ -4,8 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from idbench.identify.errors import LogError
+from idbench.identify.estimators.leave_out import Stretches
 from idbench.identify.estimators.problem import Problem
-from idbench.identify.judge.leave_out import Stretches
 from idbench.identify.judge.used_rows import UsedRows, squares_left_out
 from idbench.identify.signals.masks import ReversalMask
 
@@ -25,21 +26,19 @@ def suited_reach(problem: Problem) -> tuple[float, ...]:
     they are the most informative of all. Each mask is judged by predictions of stretches that were left out, on all rows of
     moving joints, where the written function is used: a wide mask must predict them better than the short one.
 
-    Raises
-    ------
-    IdentificationError
-        If the rows do not determine the parameters.
     """
     explicit, mask = problem.explicit, problem.chain.mask
     if not isinstance(mask, ReversalMask) or mask.threshold is not None or problem.logs[0].poses:
         return ()
-    explicit.factors.together.check()
     used, stretches = UsedRows.of(explicit), Stretches.of(explicit.parts)
     best = squares_left_out(explicit, used, stretches)
     reach = np.zeros(problem.basis.n)
     for wide in REACHES:
         chain = replace(problem.chain, mask=replace(mask, reach=(wide,) * problem.basis.n))
-        squares = squares_left_out(replace(explicit, chain=chain, _signals=(), _explicit=None), used, stretches)
+        try:
+            squares = squares_left_out(replace(explicit, chain=chain, _signals=(), _explicit=None), used, stretches)
+        except LogError:  # a short log has no room for wider edges
+            break
         for j in range(problem.basis.n):
             if squares[:, j].sum() < (1 - SHARE) * best[:, j].sum():
                 best[:, j], reach[j] = squares[:, j], wide

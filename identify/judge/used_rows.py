@@ -8,12 +8,13 @@ import numpy as np
 import numpy.typing as npt
 
 from idbench.identify.arrays import Array
+from idbench.identify.data.motion_log import MotionLog
+from idbench.identify.estimators.leave_out import Stretches, left_out
 from idbench.identify.estimators.problem import Problem
-from idbench.identify.judge.leave_out import Stretches, left_out
 from idbench.identify.models import ExplicitModel
 from idbench.identify.rows.operators import FirLowPass
-from idbench.identify.signals.filters import NoisePrefilter
 from idbench.identify.signals.masks import NoMask, slow_speed
+from idbench.identify.signals.prefilters import FirPrefilter
 
 BAND = 10.0
 """Frequency [Hz] up to which torques are judged: what drives and controllers of arms use of a model."""
@@ -40,19 +41,18 @@ class UsedRows:
 
     @classmethod
     def of(cls, problem: Problem) -> list[Self]:
-        """The rows of each log of a problem; logs of poses have none."""
-        return [cls._of_log(problem, k) for k, log in enumerate(problem.logs) if not log.poses]
+        """The rows of each log of a problem; of poses at rest all."""
+        return [cls._of_log(problem, log) for log in problem.logs]
 
     @classmethod
-    def _of_log(cls, problem: Problem, k: int) -> Self:
-        log = problem.logs[k]
-        band = min(BAND, OF_NYQUIST * log.fs / 2)
-        chain = replace(problem.chain, prefilter=NoisePrefilter(3 * band), mask=NoMask(), operator=FirLowPass(band, band))
-        chain = replace(chain, trim=None)
+    def _of_log(cls, problem: Problem, log: MotionLog) -> Self:
+        chain, band = replace(problem.chain, mask=NoMask(), trim=None), min(BAND, OF_NYQUIST * log.fs / 2)
+        if not log.poses:
+            chain = replace(chain, prefilter=FirPrefilter(3 * band), operator=FirLowPass(band, band))
         signals = chain.signals(log)
         rows = chain.rows(signals, problem.basis, ExplicitModel())
         speed = np.abs(signals.state.qd)
-        moving = (speed > slow_speed(signals.state.qd)[:, None])[:, rows.maps[0].grid.samples].T
+        moving = (log.poses | (speed > slow_speed(signals.state.qd)[:, None]))[:, rows.maps[0].grid.samples].T
         moving[:, list(log.missing)] = False
         shape = (-1, rows.kinds)
         return cls(rows.Y.reshape(shape), rows.W.reshape(*shape, rows.W.shape[-1]), moving, rows.time[:: rows.kinds], band)

@@ -17,15 +17,9 @@ from idbench.identify.rows.operators.low_pass import AbstractOperator
 from idbench.identify.rows.operators.windows import AbstractWeakForm
 from idbench.identify.rows.row_map import Grid, RowMap
 from idbench.identify.rows.rows import Rows
-from idbench.identify.signals.filters import (
-    AbstractDifferentiator,
-    AbstractPrefilter,
-    ButterworthPrefilter,
-    CentralDifference,
-    NoisePrefilter,
-    NoPrefilter,
-)
+from idbench.identify.signals.filters import AbstractDifferentiator, CentralDifference
 from idbench.identify.signals.masks import AbstractMask, NoMask, ReversalMask
+from idbench.identify.signals.prefilters import AbstractPrefilter, ButterworthPrefilter, NoisePrefilter, NoPrefilter
 from idbench.identify.signals.signals import Signals
 from idbench.identify.signals.torques import AbstractAlignment, AsLogged, ByChannel
 

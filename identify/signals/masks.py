@@ -11,7 +11,7 @@ import scipy
 from idbench.identify.arrays import Array
 from idbench.identify.errors import SettingError, require_not_negative, require_positive
 from idbench.identify.plugins import Table
-from idbench.identify.signals.filters import NOISY, SLOW, velocity_noise
+from idbench.identify.signals.prefilters import NOISY, SLOW, velocity_noise
 
 
 class AbstractMask(ABC):

@@ -12,8 +12,9 @@ from idbench.identify.arrays import Array
 from idbench.identify.blame import expect
 from idbench.identify.data.motion_log import MotionLog, TorqueChannel
 from idbench.identify.errors import LogError, PluginError
-from idbench.identify.signals.filters import AbstractDifferentiator, AbstractPrefilter
+from idbench.identify.signals.filters import AbstractDifferentiator
 from idbench.identify.signals.masks import AbstractMask
+from idbench.identify.signals.prefilters import AbstractPrefilter
 from idbench.identify.signals.torques import AbstractAlignment, Torque
 
 T = TypeVar("T")

@@ -146,7 +146,7 @@ def test_standard_errors_contain_that_of_the_delay(log, rng, model):
     plain, known = fit(0.001), fit(0.001, 5e-4)
     moved = (fit(0.0011).X - fit(0.0009).X) / 2e-4
     np.testing.assert_array_equal(plain.X, known.X)
-    added = np.sqrt(np.diag(known.covariance - plain.covariance))
+    added = np.sqrt(np.diag(known.noise_covariance - plain.noise_covariance))
     np.testing.assert_allclose(added, 5e-4 * np.abs(moved), rtol=0.1, atol=0.02 * plain.standard_errors.min())
     assert not plain.delay_covariance.any()
 

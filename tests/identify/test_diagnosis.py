@@ -60,7 +60,9 @@ def test_a_spectrum_has_the_power_of_its_signal():
 def test_cutoffs_are_those_of_the_settings(fs):
     """A FIR designed by windows has -6 dB at its cut-off; a Butterworth filter run twice has -6 dB at that of one pass."""
     grain = fs / 8192
-    assert cutoffs(CHAINS.create("idbench"), fs) == {"operator": pytest.approx(5.0, abs=grain + 0.02)}
+    found = cutoffs(CHAINS.create("idbench"), fs)
+    assert found["operator"] == pytest.approx(5.0, abs=grain + 0.02)
+    assert found["prefilter"] == pytest.approx(15.0, abs=grain + 0.02)
     found = cutoffs(CHAINS.create("paper"), fs)
     assert found["prefilter"] == pytest.approx(8.0, abs=grain + 0.02)
     assert found["operator"] == pytest.approx(4.3, abs=0.1)  # its ripple ends at 4 Hz, by 6 dB it is later

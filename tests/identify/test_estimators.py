@@ -235,7 +235,9 @@ def test_endless_memory_is_weighted_least_squares_and_a_short_one_knows_less(six
         estimate(problem, e) for e in (WeightedLeastSquares(), RecursiveLeastSquares(1e9), RecursiveLeastSquares(3.0))
     )
     np.testing.assert_allclose(endless.X, every.X, rtol=1e-3)
-    assert (short.calibrated_sigma > endless.calibrated_sigma).all()
+    ratio = short.calibrated_sigma / endless.calibrated_sigma  # of single ones chance may leave more information at the end
+    assert np.median(ratio) > 1.2
+    assert ratio.min() > 0.8
 
 
 @pytest.mark.thorough

@@ -1,8 +1,11 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from idbench.identify import NoMask, ReversalMask, SettingError
+from idbench.identify import NoMask, NoPrefilter, ReversalMask, SettingError, idbench_chain
 from idbench.identify.signals.masks import slow_speed
+from idbench.identify.signals.prefilters import FirPrefilter, NoisePrefilter
 
 
 @pytest.mark.parametrize("fs", [100.0, 1000.0])
@@ -56,11 +59,27 @@ def test_a_gradual_mask_keeps_high_frequencies_out_of_low_ones():
     assert leaked(0.1) < leaked(0.0) / 10
 
 
-def test_half_of_a_slow_joints_moving_time_stays(rng):
-    """Velocities of 0.02 rad/s below noise of 0.05 rad/s: four times the noise would leave nothing."""
+def test_the_slow_speed_is_a_share_of_the_rms_speed_or_four_times_the_noise(rng):
     t = np.arange(4000) / 100
-    qd = 0.02 * np.sin(t) + 0.05 * rng.standard_normal(len(t))
-    moving = np.abs(qd) > 0.05 * np.sqrt(np.mean(qd**2))
-    assert np.mean(np.abs(qd[moving]) > slow_speed(qd)) == pytest.approx(0.5, abs=0.01)
     fast = 2.0 * np.sin(t)
     assert slow_speed(fast) == pytest.approx(0.05 * np.sqrt(2), rel=0.01)
+    assert slow_speed(fast + 0.05 * rng.standard_normal(len(t))) == pytest.approx(0.2, rel=0.05)
+
+
+def test_a_wide_mask_is_that_of_its_joint_alone():
+    """Up to a multiple of the slow speed, with the width and taper of old: 30 and 100 ms."""
+    qd = np.tile(np.sin(2 * np.pi * 0.4 * np.arange(1000) / 100), (2, 1))
+    mixed = ReversalMask(0.1, reach=(0.0, 2.0)).weight(qd, 100.0)
+    np.testing.assert_array_equal(mixed[0], ReversalMask(0.1).weight(qd, 100.0)[0])
+    np.testing.assert_array_equal(mixed[1], ReversalMask(0.2, 0.03, 0.1).weight(qd, 100.0)[1])
+
+
+def test_positions_are_filtered_where_they_are_noisy_and_only_there(log):
+    """Encoder counts of 16 bits are, an exact log is not; above the Nyquist frequency there is nothing to filter."""
+    counts = 2 * np.pi / 2**16
+    noisy = replace(log, q=counts * np.round(log.q / counts))
+    chain = idbench_chain()
+    assert chain.suited_prefilter(noisy) == FirPrefilter(15.0)
+    assert chain.suited_prefilter(log) == NoPrefilter()
+    high = replace(chain, prefilter=NoisePrefilter(60.0))
+    assert high.suited_prefilter(noisy) == NoPrefilter()

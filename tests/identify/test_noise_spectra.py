@@ -1,5 +1,7 @@
 """What the noise of a log should look like in the explicit model's residual."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,7 +9,9 @@ from idbench.identify import (
     MODELS,
     MotionLog,
     NoiseLevels,
+    NoPrefilter,
     Problem,
+    ReversalMask,
     TorqueChannel,
     idbench_chain,
     instants,
@@ -24,7 +28,8 @@ def test_the_spectra_are_those_of_noise_put_into_a_log(position, torque, log, tr
     """Between 5 and 40 Hz, in the mean to 10 %: the residual of true parameters, over the instants that are not masked."""
     q, tau = log.q + position * rng.standard_normal(log.q.shape), log.tau + torque * rng.standard_normal(log.q.shape)
     noisy = MotionLog(log.fs, q, tau, TorqueChannel("instantaneous"))
-    problem = Problem((noisy,), scara(), EXPLICIT, idbench_chain())
+    chain = replace(idbench_chain(), prefilter=NoPrefilter(), mask=ReversalMask(width=0.03, taper=0.1))
+    problem = Problem((noisy,), scara(), EXPLICIT, chain)
     left = instants(problem.signals[0], scara(), EXPLICIT, problem.chain, truth)
     for joint in (0, 1):
         weight = left.weight[joint]

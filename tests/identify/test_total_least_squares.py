@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from idbench.identify import ExplicitModel, IdentificationError, idbench_chain, identify, scara
+from idbench.identify import ExplicitModel, IdentificationError, NoPrefilter, idbench_chain, identify, scara
 from idbench.identify.estimators import TotalLeastSquares
 from idbench.sim.encoders import IncrementalEncoder
 from idbench.sim.engine.simulation import simulate
@@ -18,7 +18,7 @@ def test_total_least_squares_refuses_where_noise_hides_the_answer():
     moves = RandomMoves(moves=12, durations=(1.3, 1.3), rest=0.7, seed=1)
     coarse = simulate(replace(load("ideal"), trajectory=moves, encoder=IncrementalEncoder(lines=256))).alone()
     chain = idbench_chain()
-    wide = replace(chain, operator=replace(chain.operator, cutoff=20.0))
+    wide = replace(chain, prefilter=NoPrefilter(), operator=replace(chain.operator, cutoff=20.0))
     with pytest.raises(IdentificationError, match="total least squares has no answer"):
         identify(coarse, scara(), ExplicitModel(), wide, TotalLeastSquares())
 
