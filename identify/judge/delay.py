@@ -224,7 +224,10 @@ def _newton(
     slopes: Callable[[Problem], list[Array]],
     within: tuple[float, float] = (-np.inf, np.inf),
 ) -> tuple[Array, Array, bool]:
-    """Delays after Newton steps, their standard errors, and whether the last step was small; none goes beyond a range."""
+    """Delays after Newton steps, delta(k+1) = delta(k) + step, their standard errors, and whether the last step was small.
+
+    None goes beyond a range.
+    """
     for _ in range(ROUNDS):
         problem = delayed(delays)
         step, sigma = delay_step(problem, slopes(problem))

@@ -65,7 +65,7 @@ QUIET = 0.02
 MIN_FREQUENCIES = 8
 """Frequencies above the band that it takes to distinguish two kinds of noise."""
 
-FAINT = 1e-6
+FAINT = 1e-2
 """Frequencies at which a kind of noise is below this share of its largest say nothing of it."""
 
 

@@ -24,7 +24,8 @@ def held_out_errors(problem: Problem) -> Array:
 
 def errors_of_stretches(problem: Problem, white: Array, Y: Array, plain: Array) -> Array:
     """Rms errors on stretches, each predicted by a fit of the others, of rows (white, Y) made independent [% of the torque]."""
-    rows, own, parts, stretches = problem.rows, len(plain), problem.parts, Stretches.of(problem.parts)
+    rows, own = problem.rows, len(plain)
+    parts, stretches = problem.parts, Stretches.of(problem.parts)
     joined = np.column_stack([white, Y])
     ends = np.cumsum([len(part.rows.time) for part in parts])
     X = left_out(stretches.products(parts, np.split(joined[:own], ends[:-1])), joined[own:])

@@ -35,7 +35,7 @@ def test_table1_prints_and_writes_everything(out, capsys):
     assert sorted({x.name for x in out.iterdir()} - {MANIFEST}) == ["log.parquet", *recording, "summary.json"]
     summary = json.loads((out / "summary.json").read_text())
     assert (summary["experiment"], summary["seed"], summary["chain"]) == ("table1", 0, "idbench")
-    assert summary["models"]["explicit"]["rows"] == 800
+    assert summary["models"]["explicit"]["rows"] == 740
     assert from_dict(summary["scenario"]) == load(SCENARIO)
     assert read_log(out / "log.parquet").samples == 4600
     assert list(out.parent.iterdir()) == [out]

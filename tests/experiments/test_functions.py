@@ -35,7 +35,7 @@ TYPES = {"double": ctypes.c_double, "float": ctypes.c_float}
 def content_of(basis, tree, values, half=None):
     """Return what a file has of a basis with values, in the order of its parameters."""
     nothing = [float("nan")] * basis.n
-    interval = dict.fromkeys(OF_INTERVAL, half or nothing)
+    interval = dict.fromkeys(OF_INTERVAL, half or nothing) | {"band": [10.0]}
     return Content(RobotFunctions(basis, tree), list(map(float, values)), [0.0] * len(values), interval, "by hand")
 
 
