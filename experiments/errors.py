@@ -22,8 +22,7 @@ CONTROL = {code: f"\\x{code:02x}" for code in (*range(32), *range(127, 160)) if 
 """Control characters, and what is printed in their place."""
 
 
-LONGEST = 160
-"""Characters of a name that are shown."""
+LONGEST = 160  # Characters of a name that are shown
 
 
 def shortened(name: object) -> str:
@@ -37,8 +36,7 @@ def visible(text: str) -> str:
     return text.translate(CONTROL)
 
 
-REPORT = "fault.txt"
-"""Name of the file of tracebacks in a results folder."""
+REPORT = "fault.txt"  # Name of the file of tracebacks in a results folder
 
 
 def is_told(error: BaseException) -> bool:

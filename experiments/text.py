@@ -28,26 +28,20 @@ JOINTS: tuple[Color, ...] = (
 )
 """Colours of the joints' curves, none of which is a model's; the first two are those of the SCARA's links."""
 
-TICKS = 6
-"""Values that have room beside an axis."""
+TICKS = 6  # Values that have room beside an axis
 
-NICE = (1.0, 2.0, 2.5, 3.0, 4.0, 5.0, 10.0)
-"""Steps between the values beside an axis, times a power of ten."""
+NICE = (1.0, 2.0, 2.5, 3.0, 4.0, 5.0, 10.0)  # Steps between the values beside an axis, times a power of ten
 
-ROUNDING = 1e-9
-"""Share of a step by which a value beside an axis is off as a number."""
+ROUNDING = 1e-9  # Share of a step by which a value beside an axis is off as a number
 
 DECADE_STEPS = (1.0,), (1.0, 3.0), (1.0, 2.0, 5.0)
 """Values within a decade that are written beside a logarithmic axis: the first that are more than `ENOUGH`."""
 
-ENOUGH = 2
-"""Values beside an axis with which it can be read."""
+ENOUGH = 2  # Values beside an axis with which it can be read
 
-SIGMAS = 2.0
-"""Half the width of intervals, in standard errors: 95 %."""
+SIGMAS = 2.0  # Half the width of intervals, in standard errors: 95 %
 
-GREY: Color = (150, 150, 150)
-"""What was measured, the truth, and marks."""
+GREY: Color = (150, 150, 150)  # What was measured, the truth, and marks
 
 FORMS: dict[str, Color] = {
     "explicit": (44, 160, 44),
@@ -58,8 +52,7 @@ FORMS: dict[str, Color] = {
 }
 """Colours of the models."""
 
-UNITS = {"power": "W", "energy": "J", "integral": "N m s"}
-"""Units of the rows of models that have no torques."""
+UNITS = {"power": "W", "energy": "J", "integral": "N m s"}  # Units of the rows of models that have no torques
 
 AGAIN: dict[str, tuple[Color, ...]] = {
     "explicit": ((190, 230, 120), (0, 150, 150)),
@@ -71,8 +64,7 @@ AGAIN: dict[str, tuple[Color, ...]] = {
 """Colours of the models in a second and a third identification of a log."""
 
 PLANNED: Color = (240, 200, 60)
-MEASURED: Color = (90, 210, 220)
-"""Colours of the planned arm and of that which the encoders see; the true arm has its own."""
+MEASURED: Color = (90, 210, 220)  # Colours of the planned arm and of that which the encoders see; the true arm has its own
 
 STATES: dict[str, Color] = {
     "moves": (70, 130, 90),
@@ -118,11 +110,9 @@ def kind_colors(kind: str, n: int) -> list[list[int]]:
     return [lighter(color, SHADES.get(kind, 0)) for color in joint_colors(n)]
 
 
-UNBELIEVED = 1e-15
-"""Probability below which its size says nothing."""
+UNBELIEVED = 1e-15  # Probability below which its size says nothing
 
-WORTHLESS = 999.0
-"""Percentages from here on all say the same."""
+WORTHLESS = 999.0  # Percentages from here on all say the same
 
 
 def percent_reach(shares: npt.ArrayLike, most: float = np.inf) -> float:

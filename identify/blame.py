@@ -13,8 +13,7 @@ from idbench.identify.errors import PluginError
 
 T = TypeVar("T")
 
-OURS = ("idbench",)
-"""Packages whose mistakes are not those of a plug-in."""
+OURS = ("idbench",)  # Packages whose mistakes are not those of a plug-in
 
 LIBRARIES = frozenset({"numpy", "scipy", "mujoco", "pyarrow", "ruckig", "pydantic"}) | sys.stdlib_module_names
 """Packages that this project calls itself."""

@@ -3,8 +3,7 @@
 from collections.abc import Callable
 from math import copysign, sqrt
 
-GOLDEN = (3 - sqrt(5)) / 2
-"""Share of an interval at which a golden section divides it."""
+GOLDEN = (3 - sqrt(5)) / 2  # Share of an interval at which a golden section divides it
 
 
 def minimum(f: Callable[[float], float], low: float, high: float, xtol: float) -> float:

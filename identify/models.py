@@ -15,8 +15,7 @@ from idbench.identify.blame import expect
 from idbench.identify.plugins import Table
 from idbench.identify.signals.signals import Signals, State
 
-STRETCH = 4096
-"""Samples whose columns are made at once where they are only summed: those of six joints then take 6 MB."""
+STRETCH = 4096  # Samples whose columns are made at once where they are only summed: those of six joints then take 6 MB
 
 
 @dataclass(frozen=True, eq=False)
@@ -227,8 +226,7 @@ def integral() -> OverWindows:
     return OverWindows(ImplicitModel())
 
 
-THREE = ("explicit", "implicit", "power")
-"""The paper's models, which are compared where no other is asked for."""
+THREE = ("explicit", "implicit", "power")  # The paper's models, which are compared where no other is asked for
 
 MODELS: Table[AbstractModel] = Table(
     "models",

@@ -22,8 +22,7 @@ _SIGNS = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
 
 _CHECKED = ConfigDict(extra="forbid", arbitrary_types_allowed=True)
 
-LARGEST = 1e12
-"""Size of a number in SI units beyond which it is a slip."""
+LARGEST = 1e12  # Size of a number in SI units beyond which it is a slip
 
 Number = Annotated[float, Strict(), AllowInfNan(False), Field(ge=-LARGEST, le=LARGEST)]
 Positive = Annotated[Number, Field(gt=0)]

@@ -15,8 +15,7 @@ from idbench.experiments.study.study import Study
 from idbench.experiments.study.study_results import print_study, summary_of
 from idbench.experiments.text import printed
 
-WIDTH = 160
-"""Characters of a line."""
+WIDTH = 160  # Characters of a line
 
 
 @final

@@ -12,17 +12,14 @@ from idbench.experiments.requests.table import as_table, request_from
 from idbench.sim.errors import ScenarioError
 from idbench.sim.settings import NotNegative, make, settings
 
-FILE = "benchmark.toml"
-"""What states the set of a folder."""
+FILE = "benchmark.toml"  # What states the set of a folder
 
-SHIPPED = Path(__file__).parent / "sets"
-"""Definitions that ship; their data do not."""
+SHIPPED = Path(__file__).parent / "sets"  # Definitions that ship; their data do not
 
 REQUESTS: Mapping[str, type[IdentifyRequest | ServoRequest]] = {"identify": IdentifyRequest, "servo": ServoRequest}
 """What a set may ask for, by the name of the table that states it."""
 
-TAKEN = ("log", "validate", "label")
-"""Keys of a request that a set states itself, or that say nothing about it."""
+TAKEN = ("log", "validate", "label")  # Keys of a request that a set states itself, or that say nothing about it
 
 
 @settings

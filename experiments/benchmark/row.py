@@ -83,8 +83,7 @@ def free_runs(held_out: HeldOut, model: str, length: float) -> dict[str, Any]:
     return {"length": length, "stretches": len(kept), "diverged": int((~kept).sum()), "nrmse": [finite(x) for x in nrmse]}
 
 
-UNSHARED = ("", "none stated")
-"""Licences under which results are not handed on."""
+UNSHARED = ("", "none stated")  # Licences under which results are not handed on
 
 Made = tuple[dict[str, Any], Callable[[Path], None]]
 """The row of a set, and what writes the files that other tools read into a folder."""

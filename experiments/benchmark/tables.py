@@ -60,8 +60,7 @@ def of_logs(logs: Sequence[Row], name: str) -> Array:
     return np.array([[np.nan if x is None else x for x in log[name]] for log in logs if name in log], dtype=float)
 
 
-OWN = "idbench"
-"""What our own row is called beside those of other tools."""
+OWN = "idbench"  # What our own row is called beside those of other tools
 
 HEADS = (
     "joints",

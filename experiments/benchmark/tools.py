@@ -95,8 +95,7 @@ def at_times(t: Array, times: Array, tau: Array) -> Array:
     return np.asarray(CubicSpline(times, tau)(np.clip(t, times[0], times[-1])))
 
 
-PREDICTED = "predicted-*.npz"
-"""Names of the files of other tools, in the folder of a set's results."""
+PREDICTED = "predicted-*.npz"  # Names of the files of other tools, in the folder of a set's results
 
 
 @final

@@ -16,8 +16,7 @@ from idbench.experiments.errors import ExperimentError, is_told, reason, report,
 
 DESCRIPTION = "A MuJoCo testbench for the dynamic identification of robots."
 
-LEAST_MEMORY = 1.5
-"""Address space [GB] below which libraries fail while they are loaded."""
+LEAST_MEMORY = 1.5  # Address space [GB] below which libraries fail while they are loaded
 
 OVERVIEW = """\
 idbench: identify the dynamics of robots, on simulated data whose truth is known, and on logs of real ones
@@ -33,8 +32,7 @@ idbench: identify the dynamics of robots, on simulated data whose truth is known
   idbench list, idbench --help    what can be combined, all commands"""
 """What `idbench` alone prints."""
 
-COMMANDS: dict[str, type] = {}
-"""The commands by name."""
+COMMANDS: dict[str, type] = {}  # The commands by name
 
 ENVIRONMENT = {
     "MUJOCO_GL": "disable",  # nothing is drawn by MuJoCo, and what would draw takes a tenth of a second to load

@@ -10,11 +10,9 @@ from threading import Timer, main_thread
 from types import FrameType
 from typing import Any
 
-INTERRUPTED = 130
-"""Exit code after Ctrl-C: 128 + SIGINT."""
+INTERRUPTED = 130  # Exit code after Ctrl-C: 128 + SIGINT
 
-AGAIN = 0.01
-"""Time [s] after which an interruption that was lost is repeated."""
+AGAIN = 0.01  # Time [s] after which an interruption that was lost is repeated
 
 
 @contextmanager

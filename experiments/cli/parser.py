@@ -135,14 +135,11 @@ def _hidden(options: type, names: Sequence[str]) -> int:
     return count
 
 
-KINDS: Mapping[type, str] = {int: "a whole number", float: "a number"}
-"""What options take, in words."""
+KINDS: Mapping[type, str] = {int: "a whole number", float: "a number"}  # What options take, in words
 
-CLOSE = 0.7
-"""Likeness of words from which on one is taken for a slip of the other."""
+CLOSE = 0.7  # Likeness of words from which on one is taken for a slip of the other
 
-COUNTS = ("", "", "two", "three", "four", "five", "six")
-"""Numbers of values that an option takes."""
+COUNTS = ("", "", "two", "three", "four", "five", "six")  # Numbers of values that an option takes
 
 
 @contextmanager

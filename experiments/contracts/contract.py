@@ -19,11 +19,9 @@ from idbench.sim.robot.robot import Robot
 from idbench.sim.scenario.scenario_file import load
 from idbench.sim.trajectories import RandomMoves, Reference
 
-FS = 100.0
-"""Sampling frequency of the examples [Hz]."""
+FS = 100.0  # Sampling frequency of the examples [Hz]
 
-RUNS = 3
-"""Runs, or simulations, of the examples."""
+RUNS = 3  # Runs, or simulations, of the examples
 
 
 class ContractError(ExperimentError):

@@ -23,8 +23,7 @@ from idbench.identify import (
 from idbench.identify.rows.row_map import Grid
 from idbench.identify.rows.rows import Rows
 
-SMALL = 1e-30
-"""Of complex steps: what they find is exact."""
+SMALL = 1e-30  # Of complex steps: what they find is exact
 
 
 def is_immutable(plugin: Any, _: Example) -> None:

@@ -10,11 +10,9 @@ from idbench.sim.engine.plant import Plant
 from idbench.sim.robot.robot import Robot
 from idbench.sim.scenario.scenario import Physics
 
-COUNT = 2 * np.pi / 2**16
-"""Step of the encoders by default [rad]."""
+COUNT = 2 * np.pi / 2**16  # Step of the encoders by default [rad]
 
-STEP = 1e-3
-"""Physics step [s]."""
+STEP = 1e-3  # Physics step [s]
 
 
 def controller_commands_every_simulation_by_itself(controller: Any, example: Example) -> None:

@@ -24,23 +24,18 @@ from idbench.sim.scenario.scenario import Scenario
 from idbench.sim.trajectories.time_optimal import approach
 from idbench.sim.trajectories.trajectory import AbstractTrajectory, Reference
 
-SIGMA, DETERMINANT = "sigma", "determinant"
-"""What is minimised by default, and what that begins with."""
+SIGMA, DETERMINANT = "sigma", "determinant"  # What is minimised by default, and what that begins with
 
-RANDOM, DRAWS = 60, 600
-"""Random motions that a motion is compared with, and draws after which fewer will do."""
+RANDOM, DRAWS = 60, 600  # Random motions that a motion is compared with, and draws after which fewer will do
 
-PREDICTED = 100.0
-"""Frequency [Hz] at which sigmas are predicted, with the noise that a faster log has in this band."""
+PREDICTED = 100.0  # Frequency [Hz] at which sigmas are predicted, with the noise that a faster log has in this band
 
-TOGETHER = 10
-"""Motions whose sigmas are predicted together."""
+TOGETHER = 10  # Motions whose sigmas are predicted together
 
 WAY, MOST = 0.9, 1e3
 """Share of the limits that the ways from home and back may use, and what stands for a limit that there is not."""
 
-PACES = 1.0, 0.3, 0.1
-"""Shares of that, the first for which torques keep their limits."""
+PACES = 1.0, 0.3, 0.1  # Shares of that, the first for which torques keep their limits
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,14 +15,11 @@ from idbench.sim.robot.inverse_dynamics import coulomb_torque, inverse_dynamics
 from idbench.sim.robot.robot import Robot
 from idbench.sim.trajectories.trajectory import Reference
 
-FS = 1000.0
-"""Frequency [Hz] at which limits are looked at."""
+FS = 1000.0  # Frequency [Hz] at which limits are looked at
 
-BLOCK = 2000
-"""States whose columns are made together."""
+BLOCK = 2000  # States whose columns are made together
 
-ROUNDING = 1e-6
-"""Share by which a limit may be exceeded: coefficients are rounded where they are written."""
+ROUNDING = 1e-6  # Share by which a limit may be exceeded: coefficients are rounded where they are written
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,20 +15,15 @@ from idbench.identify.parameters.base_parameters import random_states
 if TYPE_CHECKING:
     from idbench.experiments.excite.design import Design
 
-STATES, LEAST = 12.0, 8.0
-"""States for each period of the highest frequency, and least states a second."""
+STATES, LEAST = 12.0, 8.0  # States for each period of the highest frequency, and least states a second
 
-MANY = 400
-"""Most periods of the highest frequency: slopes of more take hours."""
+MANY = 400  # Most periods of the highest frequency: slopes of more take hours
 
-FINER = 4
-"""Instants at which limits are kept, for each state."""
+FINER = 4  # Instants at which limits are kept, for each state
 
-POSTURES = 200
-"""Random postures over which inertia is averaged."""
+POSTURES = 200  # Random postures over which inertia is averaged
 
-PASS = FirLowPass().cutoff
-"""End of the pass band of the rows [Hz]."""
+PASS = FirLowPass().cutoff  # End of the pass band of the rows [Hz]
 
 
 def plan_for(design: "Design") -> Plan:

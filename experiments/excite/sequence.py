@@ -9,11 +9,9 @@ from idbench.experiments.excite.excited import Excited
 from idbench.identify import Array, Estimate, ExplicitModel, MotionLog, brisk_shares, identify
 from idbench.sim.engine.simulation import Progress, simulate
 
-ENOUGH = 0.1
-"""Weight of a parameter that is known well enough."""
+ENOUGH = 0.1  # Weight of a parameter that is known well enough
 
-ROUNDS = 12
-"""Motions after which it ends, whatever is known."""
+ROUNDS = 12  # Motions after which it ends, whatever is known
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,8 +13,7 @@ from idbench.identify.data.kinematics import Limits
 from idbench.identify.design.plan import POWER, Plan
 from idbench.identify.design.search import DesignSearch
 
-STARTS, BASINS = 5, 12
-"""Least starts of the search, and starts times joints: few joints take little time."""
+STARTS, BASINS = 5, 12  # Least starts of the search, and starts times joints: few joints take little time
 
 
 class Stage(NamedTuple):
@@ -40,8 +39,7 @@ states that the search looks at torques may be larger, where a joint reverses.""
 FARTHEST = 1.5
 """Most by which limits become narrower at once: a motion that leads far beyond them says little of how near it may go."""
 
-CLOSER = 1.005
-"""Factor by which limits become narrower than what they are exceeded by."""
+CLOSER = 1.005  # Factor by which limits become narrower than what they are exceeded by
 
 
 def searched(design: Design, random: Sequence[Array], progress: Callable[[float], None] | None = None) -> DesignSearch:

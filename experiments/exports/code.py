@@ -11,8 +11,7 @@ from typing import final
 from idbench.experiments.exports.functions import Function, RobotFunctions
 from idbench.identify.basis.tape import Step, Symbol, Tape, Value
 
-LONG = 100
-"""Characters of an expression that is not written into another one: a line stays readable."""
+LONG = 100  # Characters of an expression that is not written into another one: a line stays readable
 
 
 C_WORDS = (

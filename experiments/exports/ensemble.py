@@ -26,17 +26,14 @@ DRAWS, ROUGH = 200, 50
 LENGTH = 0.5
 """Time of a free run [s]: errors of the start and of the torques grow with its square, and what is longer shows them alone."""
 
-STRETCHES = 20
-"""Runs over a log at most: 40 in their place change the share that is held by 0.3 % (a simulated arm)."""
+STRETCHES = 20  # Runs over a log at most: 40 in their place change the share that is held by 0.3 % (a simulated arm)
 
 LEVEL, NORMAL = 0.95, 1.96
 """Share of instants that the band shall hold, and that of a normal distribution, in its sigma, from its middle."""
 
-SETTLED = 2
-"""Samples at the beginning of a run that do not count: there the position is that of the log."""
+SETTLED = 2  # Samples at the beginning of a run that do not count: there the position is that of the log
 
-MOST = 4_000_000
-"""Values of torques that are drawn at once: 30 MB."""
+MOST = 4_000_000  # Values of torques that are drawn at once: 30 MB
 
 USUAL = 0.2
 """Share by which parameters are often varied where nothing is known of them, as in the published randomizations of robots."""

@@ -19,8 +19,7 @@ from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.results.writing import require_free, require_free_folder
 from idbench.sim.robot.rewrite import rewritten
 
-FOLDER = ".ensemble"
-"""Ending of the name of a folder with robots."""
+FOLDER = ".ensemble"  # Ending of the name of a folder with robots
 
 
 @final

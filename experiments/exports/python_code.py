@@ -21,8 +21,7 @@ OPERATIONS = {
     "<=": "({} <= {})",
 }
 
-TAB = 4 * " "
-"""How lines are indented."""
+TAB = 4 * " "  # How lines are indented
 
 HEAD = '''"""{name}: {origin}.
 

@@ -11,11 +11,9 @@ from idbench.experiments.identification.fit import Fit
 from idbench.identify.basis.block import named
 from idbench.sim.robot.tree import standard_parameters
 
-EARTH = [0.0, 0.0, -9.81]
-"""Gravity as readers of these files have it."""
+EARTH = [0.0, 0.0, -9.81]  # Gravity as readers of these files have it
 
-SMALLEST = 0.1
-"""Share of a joint's torque [%] from which on something that is missing is named."""
+SMALLEST = 0.1  # Share of a joint's torque [%] from which on something that is missing is named
 
 
 def missing(written: WrittenRobot, letters: Sequence[str], coupled: bool = False) -> str:

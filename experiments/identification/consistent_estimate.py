@@ -16,8 +16,7 @@ HELD_NEAR = 1.0
 """What a step to twice the robot costs one that is drawn [squared sigma]: a prior of that width. A millionth lets rotors
 and links that are grouped share their sum in any way, by 40 %; a hundred holds back 4 sigma of what is known."""
 
-SURE = 0.1
-"""Sigma of what was left out, as a share of the least of the others."""
+SURE = 0.1  # Sigma of what was left out, as a share of the least of the others
 
 
 def consistent_of(robot_model: RobotModel, estimate: Estimate, weight: float = NEAR, near: Array | None = None) -> Consistent:

@@ -16,8 +16,7 @@ from idbench.sim.robot.rewrite import compiled, rewritten
 from idbench.sim.robot.robot import Robot
 from idbench.sim.robot.tree import standard_parameters
 
-LITTLE = 0.1
-"""Differences of torques of less than so many per cent are not named."""
+LITTLE = 0.1  # Differences of torques of less than so many per cent are not named
 
 
 @final

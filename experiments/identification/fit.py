@@ -29,8 +29,7 @@ from idbench.identify.judge.torque_interval import TorqueInterval, torque_interv
 from idbench.identify.rows.rows import Rows
 from idbench.identify.signals.masks import slow_speed
 
-NOTHING = 1e-12
-"""Share of a torque's squares below which its variance is rounding."""
+NOTHING = 1e-12  # Share of a torque's squares below which its variance is rounding
 
 Outcomes = dict[str, Estimate | IdentificationError]
 """The estimate of every model, or why it has none."""

@@ -23,8 +23,7 @@ from idbench.identify.rows.rows import Rows
 from idbench.identify.signals.masks import NoMask
 from idbench.identify.telling import stage
 
-SHOWN = 0.02
-"""Share of the largest entry of a law's column that a mask must leave for the rows to show the law."""
+SHOWN = 0.02  # Share of the largest entry of a law's column that a mask must leave for the rows to show the law
 
 
 def hidden_laws(before: Problem, after: Problem) -> tuple[str, ...]:
@@ -49,8 +48,7 @@ def _largest(rows: Rows, parameter: Parameter) -> float:
     return float(np.abs(rows.W[..., rows.names.index(parameter.name)]).max())
 
 
-TURNS = 3
-"""How often laws of friction and delay are found in turns, at most."""
+TURNS = 3  # How often laws of friction and delay are found in turns, at most
 
 
 def chosen_friction(request: Request, logs: tuple[MotionLog, ...], most: int | None = None) -> tuple[Request, FrictionChoice]:

@@ -19,11 +19,9 @@ from idbench.identify import (
 from idbench.identify.basis import Balancer
 from idbench.identify.plugins import did_you_mean
 
-AUTO = "auto"
-"""The laws are those that predict motion best that was not fitted."""
+AUTO = "auto"  # The laws are those that predict motion best that was not fitted
 
-SMOOTH = "smooth"
-"""The friction of every joint is a smooth function of its velocity, beside standard laws and load."""
+SMOOTH = "smooth"  # The friction of every joint is a smooth function of its velocity, beside standard laws and load
 
 STANDARD = ("viscous", "coulomb")
 
@@ -34,8 +32,7 @@ GROUPS: Mapping[str, tuple[str, ...]] = {
 }
 """Laws that go together, by one name."""
 
-NUMBERS = (float, Array | float)
-"""Types of settings that a number after a colon may be."""
+NUMBERS = (float, Array | float)  # Types of settings that a number after a colon may be
 
 BEYOND, LARGEST = 100.0, 1e6
 """How far beyond the range in which a shape is looked for it may be given, and the largest of other settings."""
@@ -194,8 +191,7 @@ def joint_of(option: str, where: str, joints: Sequence[str]) -> int:
 
 
 OPTION = "--balancer"
-GEOMETRY = tuple(field.name for field in fields(Balancer) if field.name != "joint")
-"""What is stated of a balancer."""
+GEOMETRY = tuple(field.name for field in fields(Balancer) if field.name != "joint")  # What is stated of a balancer
 
 EXAMPLE = "2=a:0.2,b:0.8,zero:-1.66"
 

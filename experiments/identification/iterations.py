@@ -10,8 +10,7 @@ from idbench.identify import Estimate, InstrumentalVariables, WeightedLeastSquar
 from idbench.identify import estimate as identified_by
 from idbench.identify.judge.excitation import LEVEL
 
-FAR = 5.0
-"""Difference from least squares, in sigma, that is not chance."""
+FAR = 5.0  # Difference from least squares, in sigma, that is not chance
 
 
 def words_of_iterations(fit: Fit) -> Iterator[str]:

@@ -17,8 +17,7 @@ from idbench.identify.rows.factors import AbstractPrior
 KINDS: Mapping[str, frozenset[Kind]] = {"links": BODY, "armatures": frozenset({"rotor inertia"}), "friction": FRICTION}
 """Groups of parameters that can be held together, at the values of the robot's file."""
 
-FILE = "file"
-"""Word for the value in the robot's file."""
+FILE = "file"  # Word for the value in the robot's file
 
 
 @final
@@ -74,8 +73,7 @@ class Known:
                 raise ExperimentError(f"--hold: there is no parameter {name!r}{hint}; there are {', '.join(names)}")
 
 
-SHARE = 1.0
-"""Relative change of the links of a file that is expected where nobody says it and no log has been asked."""
+SHARE = 1.0  # Relative change of the links of a file that is expected where nobody says it and no log has been asked
 
 
 @final

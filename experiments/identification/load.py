@@ -19,8 +19,7 @@ from idbench.identify import LogError, MotionLog
 from idbench.identify.judge.band import Band
 from idbench.identify.telling import stage
 
-MOST_STARTS = 1000
-"""Instants of a log that are looked at for the beginning of another."""
+MOST_STARTS = 1000  # Instants of a log that are looked at for the beginning of another
 
 
 @dataclass(frozen=True, eq=False)

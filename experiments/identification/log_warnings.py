@@ -10,8 +10,7 @@ from idbench.identify.basis.block import FRICTION, RIGID, Kind
 from idbench.identify.data.jumps import Jump, jumps
 from idbench.identify.data.kinematics import GROUND
 
-FAR_OFF = 30.0
-"""Factor between measured and expected torques that no missing rotor makes in the joint that carries most."""
+FAR_OFF = 30.0  # Factor between measured and expected torques that no missing rotor makes in the joint that carries most
 
 PARTS: dict[str, frozenset[Kind]] = {"friction": FRICTION, "links and rotors": RIGID}
 """What of a file makes torques, and by which parameters."""
@@ -65,20 +64,16 @@ def _torques(fit: Fit, R: Array, kinds: frozenset[Kind], X: Array, filed: Array)
     return found, stated
 
 
-SLACK = 0.05
-"""Positions may be beyond a range by this share of it: ranges of files are rounded."""
+SLACK = 0.05  # Positions may be beyond a range by this share of it: ranges of files are rounded
 
 MOST_TURNS = 2.0
 """Turns of a hinge between the ends of a log beyond which degrees are suspected, where the robot gives it no range."""
 
-HARDLY = 0.02
-"""Share of its range below which a joint hardly moves."""
+HARDLY = 0.02  # Share of its range below which a joint hardly moves
 
-MOST_JUMPS = 3
-"""Jumps of a log that are named."""
+MOST_JUMPS = 3  # Jumps of a log that are named
 
-STILL = 1e-3
-"""A joint that travels less than this share of what the busiest does is at rest, and trembles."""
+STILL = 1e-3  # A joint that travels less than this share of what the busiest does is at rest, and trembles
 
 
 def warnings_of_log(log: MotionLog, tree: KinematicTree) -> list[str]:

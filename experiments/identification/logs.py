@@ -18,8 +18,7 @@ from idbench.identify.rows.rows import is_long
 if TYPE_CHECKING:
     from idbench.experiments.identification.reading import ReadLog
 
-STILL = 1e-3
-"""A joint is at rest while its velocity is below this share of its largest."""
+STILL = 1e-3  # A joint is at rest while its velocity is below this share of its largest
 
 
 @final
@@ -111,8 +110,7 @@ def delay_method(delay: str | None) -> str | None:
     return delay if delay in DELAYS else None
 
 
-LEAST = 0.05
-"""Share of a sample by which a delay must move to matter."""
+LEAST = 0.05  # Share of a sample by which a delay must move to matter
 
 WITH_LAWS = "torque delay with the laws of friction that were chosen"
 

@@ -12,11 +12,9 @@ from idbench.identify import Array, MotionLog, TorqueChannel
 from idbench.identify.data.log_columns import LogColumns
 from idbench.identify.rows.chain import poses_chain
 
-POSES = "poses"
-"""Name of their chain."""
+POSES = "poses"  # Name of their chain
 
-SLOWEST = 0.5
-"""Sampling period [s] that no log of a robot's motion has: its times are in another unit, or its rows are poses."""
+SLOWEST = 0.5  # Sampling period [s] that no log of a robot's motion has: its times are in another unit, or its rows are poses
 
 APART = 0.6
 """Rms of the steps of a joint, over the standard deviation of its positions, from which on rows do not continue each other: of

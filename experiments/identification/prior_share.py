@@ -9,8 +9,7 @@ from idbench.identify import Array, IdentificationError, MotionLog, estimate
 from idbench.identify.estimators.leave_out import Stretches, left_out
 from idbench.identify.rows.factors import prior_rows, triangular
 
-SHARES = tuple(10 ** (-k / 4) for k in range(-4, 7))
-"""Relative changes of links that are tried: from ten times to 3 %."""
+SHARES = tuple(10 ** (-k / 4) for k in range(-4, 7))  # Relative changes of links that are tried: from ten times to 3 %
 
 
 def chosen_share(request: Request, logs: Sequence[MotionLog]) -> float | None:

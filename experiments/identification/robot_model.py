@@ -22,8 +22,7 @@ from idbench.sim.robot.mounting import PLAIN, Mounting, with_values
 from idbench.sim.robot.robot import FILES, Robot
 from idbench.sim.robot.tree import kinematic_tree, standard_parameters
 
-SCARA = "scara"
-"""The robot of the paper, which is taken where none is named."""
+SCARA = "scara"  # The robot of the paper, which is taken where none is named
 
 
 @final

@@ -22,8 +22,7 @@ from idbench.sim.scenario.measurement import Ripple
 from idbench.sim.scenario.scenario import Scenario
 from idbench.sim.scenario.scenario_file import to_dict
 
-LONG, ENDLESS = 3e6, 1e9
-"""Physics steps from which on a simulation takes minutes, and hours or days."""
+LONG, ENDLESS = 3e6, 1e9  # Physics steps from which on a simulation takes minutes, and hours or days
 
 
 @dataclass(frozen=True, eq=False)

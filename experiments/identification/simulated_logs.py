@@ -23,8 +23,7 @@ in half of the joints that have one, if a log is of a simulation of the file, wi
 of robots of others the shares are 0.04 and 0.27 at most; of three by another integrator than the file's above 100."""
 
 
-DERIVATIVES = 4
-"""Of the positions, that the torques of a step take."""
+DERIVATIVES = 4  # Of the positions, that the torques of a step take
 
 
 @final

@@ -26,8 +26,7 @@ from idbench.sim.trajectories import Reference
 IMPOSSIBLE = "; if the loop is right, the parameters are not physically consistent: start from a file of --write-mjcf"
 """What else it may be."""
 
-SAME = 1e-6
-"""Share by which frequencies that are the same differ at most."""
+SAME = 1e-6  # Share by which frequencies that are the same differ at most
 
 
 @final

@@ -12,8 +12,7 @@ from idbench.identify.parameters.prior import NormalPrior, evident_sizes
 if TYPE_CHECKING:
     from idbench.experiments.identification.request import Request
 
-BESIDE = "standard+load"
-"""Laws beside the smooth functions."""
+BESIDE = "standard+load"  # Laws beside the smooth functions
 
 FINE = 0.1
 """Velocity below which functions are fine, over the joint's rms speed: published Stribeck velocities, 0.02 to 0.5 rad/s, are

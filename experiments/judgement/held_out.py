@@ -30,8 +30,7 @@ GOOD, FAIR = 2.0, 10.0
 
 docs/results-arms.md has the table of right and wrong models from which these come."""
 
-WORDS = ("good", "fair", "unsure", "poor")
-"""Verdicts, the worst last."""
+WORDS = ("good", "fair", "unsure", "poor")  # Verdicts, the worst last
 
 
 @final
@@ -119,17 +118,14 @@ def _worst(shares: Array) -> float:
     return float(np.max(shares, initial=0.0, where=~np.isnan(shares)))
 
 
-BANDWIDTH = 5.0
-"""Of the loop that holds the simulated robot to the log [rad/s]: weak, so that errors of the model show."""
+BANDWIDTH = 5.0  # Of the loop that holds the simulated robot to the log [rad/s]: weak, so that errors of the model show
 
 SAME = 1e-3
 """Share of a standard error up to which parameters of two models are the same: implicit differs from explicit by 1e-5."""
 
-SHAPE = "shape of friction"
-"""Kind of parameters that enter nonlinearly."""
+SHAPE = "shape of friction"  # Kind of parameters that enter nonlinearly
 
-LONGEST = 60.0
-"""Time [s] that is simulated, from the beginning of the held-out log."""
+LONGEST = 60.0  # Time [s] that is simulated, from the beginning of the held-out log
 
 
 def on_log(result: Fit, name: str, log: MotionLog) -> "HeldOut":

@@ -39,8 +39,7 @@ from idbench.sim.errors import BenchError
 NEGLIGIBLE = 2e-3
 """Share of a sampling period by which a delay may be off without a word: a hundredth of the SCARA's Fv1 at 100 Hz."""
 
-SURE = 4.0
-"""A delay that differs from the stated one by more than so many sigma is reported."""
+SURE = 4.0  # A delay that differs from the stated one by more than so many sigma is reported
 
 WORTH, TOLERABLE = 0.7, 20.0
 """Options are recommended if they bring the error below this share of what it was, and below so many per cent."""
@@ -50,8 +49,7 @@ MOST_TIME, AUTO_FITS = 60.0, 100
 
 AUTO = "--friction auto"
 
-DRASTIC = 1 / 3
-"""Below this share of what it was they are recommended whatever is left."""
+DRASTIC = 1 / 3  # Below this share of what it was they are recommended whatever is left
 
 
 def delay_advice(result: Fit) -> Iterator[str]:

@@ -21,34 +21,26 @@ USELESS = 0.5
 """Share of a torque that one sigma of the parameters may make before the estimate is called useless; what is recommended
 instead makes a fifth of it at most."""
 
-ENOUGH = 4
-"""Rows for each parameter beyond which a large sigma is no matter of too few of them."""
+ENOUGH = 4  # Rows for each parameter beyond which a large sigma is no matter of too few of them
 
-MUCH_LONGER = 100
-"""Times from which on the length of a log is not what is wrong with it."""
+MUCH_LONGER = 100  # Times from which on the length of a log is not what is wrong with it
 
-FAR = 4.0
-"""Errors of more than so many sigma are marked: normal ones come once in 16 000."""
+FAR = 4.0  # Errors of more than so many sigma are marked: normal ones come once in 16 000
 
-WEAK = 0.5
-"""Share of its value that the sigma of a parameter may have before it is marked as weak."""
+WEAK = 0.5  # Share of its value that the sigma of a parameter may have before it is marked as weak
 
-ALIKE = 0.1
-"""Share of what an integrator makes of damping by which rotors of a simulation differ from the file's beside that."""
+ALIKE = 0.1  # Share of what an integrator makes of damping by which rotors of a simulation differ from the file's beside that
 
-LINK_SIDE = 3.0
-"""A rotor's inertia this many sigma below zero is impossible: the torques do not contain the rotor."""
+LINK_SIDE = 3.0  # A rotor's inertia this many sigma below zero is impossible: the torques do not contain the rotor
 
-OPEN = 0.02
-"""Share of a joint's torque on a brisk motion that one sigma of a parameter may make before it counts as left open."""
+OPEN = 0.02  # Share of a joint's torque on a brisk motion that one sigma of a parameter may make before it counts as left open
 
 
 LOG = "the log"
 DELAY = "the torque's delay"
 FILE = "the robot's file"
 MOTION = "the motion"
-MODEL = "the model"
-"""Subjects of warnings, in the order in which to check them: the first may cause the others."""
+MODEL = "the model"  # Subjects of warnings, in the order in which to check them: the first may cause the others
 
 
 def warnings_of_result(fit: Fit) -> dict[str, list[str]]:

@@ -33,8 +33,7 @@ GAIN_STEP = 1e-3
 
 OF_GAINS = "sigma of the payload has no part of an error of the torque constants (--gain-sigma), which looks like mass"
 
-RUNS = 20
-"""Simulated pairs of runs."""
+RUNS = 20  # Simulated pairs of runs
 
 
 @dataclass(frozen=True, eq=False)

@@ -26,14 +26,11 @@ from idbench.sim.engine.simulation import Progress
 from idbench.sim.robot.robot import Robot
 from idbench.sim.robot.scara import scara_truth
 
-COMPARED = ("paper", "paper_masked")
-"""Chains whose errors are compared with the paper's."""
+COMPARED = ("paper", "paper_masked")  # Chains whose errors are compared with the paper's
 
-TOGETHER = 50
-"""Motions that are identified together."""
+TOGETHER = 50  # Motions that are identified together
 
-BAND = (5.0, 95.0)
-"""Percentiles between which the paper's error counts as explained."""
+BAND = (5.0, 95.0)  # Percentiles between which the paper's error counts as explained
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,8 +62,7 @@ class Errors:
         return inside
 
 
-ROUNDED = 5e-4
-"""Half of the last digit of the paper's errors [%]."""
+ROUNDED = 5e-4  # Half of the last digit of the paper's errors [%]
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,8 +12,7 @@ from idbench.experiments.paper.motions import BAND, COMPARED, Errors, Table1Moti
 from idbench.experiments.paper.table1 import PAPER
 from idbench.experiments.text import new_table, print_titled
 
-FEW = 40
-"""Motions below which less than two lie outside of either end of the band."""
+FEW = 40  # Motions below which less than two lie outside of either end of the band
 
 COLORS = {"paper": "#b5651d", "paper_masked": "#2f6f9f"}
 

@@ -30,11 +30,9 @@ from idbench.sim.scenario.scenario import Scenario
 from idbench.sim.scenario.scenario_file import to_dict
 from idbench.sim.trajectories import Reference
 
-CHAINS_COMPARED = ("paper", "paper_masked", "idbench")
-"""Chains of the comparison."""
+CHAINS_COMPARED = ("paper", "paper_masked", "idbench")  # Chains of the comparison
 
-SCENARIO = "table1"
-"""The scenario that ships."""
+SCENARIO = "table1"  # The scenario that ships
 
 
 @dataclass(frozen=True)

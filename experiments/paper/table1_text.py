@@ -27,8 +27,7 @@ from idbench.identify import (
 )
 from idbench.identify.rows.chain import paper_masked_chain
 
-OVER = {"energy": "power", "integral": "implicit"}
-"""Models that are others, integrated."""
+OVER = {"energy": "power", "integral": "implicit"}  # Models that are others, integrated
 
 
 def _finer(chain: Chain) -> Chain:

@@ -31,8 +31,7 @@ from idbench.sim.robot.scara import scara_truth
 from idbench.sim.scenario.scenario import Scenario
 from idbench.sim.scenario.scenario_file import to_dict
 
-SCENARIO = "table2"
-"""The scenario that ships."""
+SCENARIO = "table2"  # The scenario that ships
 
 REALIZATIONS: Mapping[str, int] = {"explicit": 2, "implicit": 2, "power": 4}
 """Realizations of the trajectory that make r = 1600 rows (section 7.3)."""
@@ -74,8 +73,7 @@ PAPER: Mapping[str, Table2Column] = {
 }
 """Table 2 of the paper."""
 
-PAPER_ROWS = 1600
-"""r of every column of Table 2 (section 7.3)."""
+PAPER_ROWS = 1600  # r of every column of Table 2 (section 7.3)
 
 
 @dataclass(frozen=True, eq=False)

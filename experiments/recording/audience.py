@@ -17,14 +17,11 @@ from idbench.experiments.requests.words import Count, Real, Url
 if TYPE_CHECKING:
     import rerun as rr
 
-GOODBYE = 10.0
-"""How long a viewer may take to take what is still on its way to it, at the end [s]."""
+GOODBYE = 10.0  # How long a viewer may take to take what is still on its way to it, at the end [s]
 
-DEAF = 6
-"""How often in a row a viewer may fail to take what is sent within half a second."""
+DEAF = 6  # How often in a row a viewer may fail to take what is sent within half a second
 
-PORT = 9090
-"""Port of the web viewer."""
+PORT = 9090  # Port of the web viewer
 
 LEAVING = "idbench-leaving"
 

@@ -11,8 +11,7 @@ import rerun as rr
 
 from idbench.identify import Array
 
-NANOSECONDS = 1_000_000_000
-"""In a second: the unit of rerun's times."""
+NANOSECONDS = 1_000_000_000  # In a second: the unit of rerun's times
 
 SHOWN, POSES = 62.5, 31.25
 """Frequencies [Hz] above which curves, and poses of the arms, are thinned out: a minute on a screen has no more points."""

@@ -56,14 +56,11 @@ def record_table1(table: Table1, audience: Audience | None = None) -> list[tuple
     return streams
 
 
-BEND = 0.01
-"""Error [%] up to which axes are linear."""
+BEND = 0.01  # Error [%] up to which axes are linear
 
-NOUGHT = 0.005
-"""Error [%] below which there is none at two decimals."""
+NOUGHT = 0.005  # Error [%] below which there is none at two decimals
 
-NOTABLE = 1.0
-"""Error [%] from which on it is written in bold."""
+NOTABLE = 1.0  # Error [%] from which on it is written in bold
 
 
 def finish_table2(recording: RunRecording, table: Table2) -> list[tuple[str, Stream]]:
@@ -125,8 +122,7 @@ def _markdown(table: Table2) -> str:
     return "\n".join(lines)
 
 
-SIGNALS = ("q/measured", "qd/true", "torque/log")
-"""Of the second run and of those after it, what is laid over the first one's."""
+SIGNALS = ("q/measured", "qd/true", "torque/log")  # Of the second run and of those after it, what is laid over the first one's
 
 
 def compare(folders: Sequence[Path], tab: str, out: Path) -> None:

@@ -20,20 +20,16 @@ from idbench.experiments.reports.excite import lines
 from idbench.experiments.text import FORMS, GREY, Color, joint_colors
 from idbench.sim.scenario.scenario_file import to_toml
 
-SHOWN = 50.0
-"""Frequency [Hz] of the curves."""
+SHOWN = 50.0  # Frequency [Hz] of the curves
 
 DARK, BRIGHT = np.array([32.0, 32.0, 36.0]), np.array([90.0, 200.0, 120.0])
 """Colours of cells: of a stretch without information, and of the most informative one."""
 
-LEVELS = 8
-"""Colours that can be distinguished: an entity each, where one for each cell would make a large recording."""
+LEVELS = 8  # Colours that can be distinguished: an entity each, where one for each cell would make a large recording
 
-MAX_ROWS = 13
-"""Parameters of a chart."""
+MAX_ROWS = 13  # Parameters of a chart
 
-NOTABLE = 0.2
-"""Largest share of a limit below which it is not shown: it is in nobody's way."""
+NOTABLE = 0.2  # Largest share of a limit below which it is not shown: it is in nobody's way
 
 
 def record_excited(found: Excited, audience: Audience | None = None) -> list[tuple[str, Stream]]:

@@ -59,11 +59,9 @@ def _send_band(stream: Stream, path: str, t: Array, values: Array, sigma: Array,
     stream.send(path, [seconds(t)], rr.Measurements.columns(values=values, variances=sigma**2))
 
 
-EVERY = 0.5
-"""Time between the instants of recursive estimates [s]."""
+EVERY = 0.5  # Time between the instants of recursive estimates [s]
 
-WIDE = 7.0
-"""Width of what a mistake explains, on which the residual is drawn."""
+WIDE = 7.0  # Width of what a mistake explains, on which the residual is drawn
 
 WIDEST = 0.5
 """A recursive estimate is shown once its sigma has been below this share of the last one, and in the second half anyway."""

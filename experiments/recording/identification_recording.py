@@ -28,8 +28,7 @@ from idbench.sim.scenario.scenario_file import to_toml
 
 ROLES = ("true", "planned", "measured")
 
-UNWATCHED = 10.0
-"""Length of the stretches of a run that nobody watches [s]: what is not recorded yet takes memory."""
+UNWATCHED = 10.0  # Length of the stretches of a run that nobody watches [s]: what is not recorded yet takes memory
 
 
 class RunRecording:

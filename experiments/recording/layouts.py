@@ -34,14 +34,11 @@ from idbench.experiments.recording.views import (
     text,
 )
 
-HIGHER = 26
-"""How much higher a layout is than the legend above it."""
+HIGHER = 26  # How much higher a layout is than the legend above it
 
-FEW = 2
-"""Parameters of a study up to which two stand in a row."""
+FEW = 2  # Parameters of a study up to which two stand in a row
 
-PAGE = 8
-"""Parameters of a study that are seen at once."""
+PAGE = 8  # Parameters of a study that are seen at once
 
 
 def table2(shelf: Shelf) -> Part:

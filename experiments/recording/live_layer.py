@@ -25,8 +25,7 @@ if TYPE_CHECKING:
 GROWTH = 1.1
 """How much longer the log must be before it is identified again: so often that the work stays in proportion to the log."""
 
-ESTIMATOR = "WLS"
-"""Quick, as it is asked again and again."""
+ESTIMATOR = "WLS"  # Quick, as it is asked again and again
 
 LABEL = "so-far"
 

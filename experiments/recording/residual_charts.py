@@ -24,8 +24,7 @@ from idbench.experiments.reports.friction_curves import (
 from idbench.experiments.text import GREY, JOINTS, SIGMAS, Color, model_color, percent_reach
 from idbench.identify import Array, Estimate, Instants, binned, cutoffs
 
-LINEAR_UP_TO = 1e-3
-"""Difference [sigma] up to which the axis is linear."""
+LINEAR_UP_TO = 1e-3  # Difference [sigma] up to which the axis is linear
 
 
 def send_iterations(stream: Stream, at: str, fit: Fit) -> None:
@@ -51,11 +50,9 @@ def _send(stream: Stream, at: str, estimate: Estimate) -> None:
             chart.marks(f"{estimate.names[p]} ", rounds, off[:, p], color)
 
 
-MAX_ROWS = 13
-"""Parameters of a single chart; more have a chart for each joint."""
+MAX_ROWS = 13  # Parameters of a single chart; more have a chart for each joint
 
-ASIDE = 0.22
-"""How far the models of a parameter stand apart, of its room."""
+ASIDE = 0.22  # How far the models of a parameter stand apart, of its room
 
 
 def send_parameters(stream: Stream, at: str, fit: Fit, number: int = 0) -> None:
@@ -116,20 +113,15 @@ def _singular_values(stream: Stream, at: str, fit: Fit, number: int) -> None:
         chart.line(f"{form}: {1 / share[-1]:.3g}", numbers, share, model_color(form, number))
 
 
-BINS = {"over_velocity": 41, "over_position": 240}
-"""Bins of residuals: over position fine enough for a motor of many slots."""
+BINS = {"over_velocity": 41, "over_position": 240}  # Bins of residuals: over position fine enough for a motor of many slots
 
-FEWEST = 5
-"""Samples from which on a bin has a mean."""
+FEWEST = 5  # Samples from which on a bin has a mean
 
-DOTS = 2500
-"""Dots of a chart: more would only hide each other."""
+DOTS = 2500  # Dots of a chart: more would only hide each other
 
-FAINTEST = 1e-3
-"""What a spectrum shows, as a share of its highest value."""
+FAINTEST = 1e-3  # What a spectrum shows, as a share of its highest value
 
-DARK: Color = (90, 90, 90)
-"""What the mask leaves out."""
+DARK: Color = (90, 90, 90)  # What the mask leaves out
 
 
 @dataclass(frozen=True, eq=False)

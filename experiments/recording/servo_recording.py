@@ -16,8 +16,7 @@ from idbench.identify.files.servo_log import ServoColumns
 from idbench.identify.servo.rows import smoothed
 from idbench.sim.robot.robot import Robot
 
-COMMANDED = [200, 160, 60]
-"""Colour of commands."""
+COMMANDED = [200, 160, 60]  # Colour of commands
 
 
 def record_servos(

@@ -17,8 +17,7 @@ from idbench.identify import Array
 
 APPLICATION = "idbench"
 
-SIZES = "rms"
-"""Where the sizes of curves are kept: rms/SMALLEST_LARGEST/PATH."""
+SIZES = "rms"  # Where the sizes of curves are kept: rms/SMALLEST_LARGEST/PATH
 
 
 class Stream:

@@ -14,8 +14,7 @@ from idbench.experiments.errors import ExperimentError
 
 LOOPBACK = "127.0.0.1"
 
-PATIENCE = 20.0
-"""How long a viewer may take to start, or to take what is on its way to it [s]."""
+PATIENCE = 20.0  # How long a viewer may take to start, or to take what is on its way to it [s]
 
 
 def address(url: str) -> tuple[str, int]:

@@ -12,8 +12,7 @@ from idbench.sim.robot.inverse_dynamics import coulomb_torque, inverse_dynamics
 from idbench.sim.robot.robot import Robot
 from idbench.sim.trajectories import Reference
 
-ROUNDING = 1e-12
-"""Torques below this share of the total are rounding."""
+ROUNDING = 1e-12  # Torques below this share of the total are rounding
 
 
 @final

@@ -111,8 +111,7 @@ def _explained(share: float) -> str:
     return f"{100 * share:.3f} %" if share > -WORTHLESS / 100 else f"<-{WORTHLESS:g} %"
 
 
-LEAST = 0.01
-"""Difference in sigma that means nothing."""
+LEAST = 0.01  # Difference in sigma that means nothing
 
 
 def models_in_full(fit: Fit, asked: bool) -> tuple[str, ...]:

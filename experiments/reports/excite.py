@@ -98,8 +98,7 @@ def print_sequence(console: Console, sequence: MotionSequence) -> None:
     console.print(Text(reached if sequence.reached else short), soft_wrap=True)
 
 
-PLOTTED = 100.0
-"""Frequency [Hz] of curves."""
+PLOTTED = 100.0  # Frequency [Hz] of curves
 
 
 def report(found: Excited, command: str) -> str:

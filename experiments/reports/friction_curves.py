@@ -16,8 +16,7 @@ from idbench.identify.judge.residuals import filtered
 from idbench.identify.rows.row_map import Kernel
 from idbench.identify.signals.signals import Signals, State
 
-RESOLUTION = 0.5
-"""Distance of the frequencies [Hz]."""
+RESOLUTION = 0.5  # Distance of the frequencies [Hz]
 
 
 @dataclass(frozen=True)
@@ -78,17 +77,13 @@ def _density(left: Instants, row: int, fs: float) -> tuple[Array, Array]:
 FRICTIONS = ("viscous friction", "Coulomb friction", "friction", "shape of friction", "offset")
 """Kinds of parameters that make a friction law."""
 
-WHOLE = 0.99
-"""Share of a row's weights from which on the mask takes nothing of it."""
+WHOLE = 0.99  # Share of a row's weights from which on the mask takes nothing of it
 
-BEYOND = 1.3
-"""Up to which multiple of the speeds of the log a law is drawn."""
+BEYOND = 1.3  # Up to which multiple of the speeds of the log a law is drawn
 
-POINTS = 201
-"""Of a curve to either side."""
+POINTS = 201  # Of a curve to either side
 
-LOADS = (0.05, 0.95)
-"""Quantiles of the load at which a law that grows with it is drawn."""
+LOADS = (0.05, 0.95)  # Quantiles of the load at which a law that grows with it is drawn
 
 
 @dataclass(frozen=True)

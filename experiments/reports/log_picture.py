@@ -9,8 +9,7 @@ from idbench.experiments.text import JOINTS
 from idbench.identify import Array
 from idbench.identify.signals.spectra import welch
 
-POINTS = 4000
-"""Largest number of points of a curve: more are invisible."""
+POINTS = 4000  # Largest number of points of a curve: more are invisible
 
 
 def figure_of(facts: LogFacts) -> Figure:

@@ -31,8 +31,7 @@ from idbench.identify.noise.linearization import smoothed
 
 T = TypeVar("T")
 
-LONGEST = 20
-"""Correlations that are listed, the strongest ones."""
+LONGEST = 20  # Correlations that are listed, the strongest ones
 
 
 def report(

@@ -10,26 +10,19 @@ import numpy as np
 from idbench.experiments.text import decade_values, round_values
 from idbench.identify import Array
 
-WIDTH = 520.0
-"""Of a panel [px]: two beside each other on a page, one on a telephone."""
+WIDTH = 520.0  # Of a panel [px]: two beside each other on a page, one on a telephone
 
-ROW = 96.0
-"""An inch of a panel's height [px]."""
+ROW = 96.0  # An inch of a panel's height [px]
 
-LEFT = 46.0
-"""Room beside a panel for numbers [px]."""
+LEFT = 46.0  # Room beside a panel for numbers [px]
 
-RIGHT = 8.0
-"""Room at their other end [px]."""
+RIGHT = 8.0  # Room at their other end [px]
 
-TOP = 20.0
-"""Room for the title [px]."""
+TOP = 20.0  # Room for the title [px]
 
-BOTTOM = 20.0
-"""Room for numbers below a panel [px]."""
+BOTTOM = 20.0  # Room for numbers below a panel [px]
 
-ABOVE = 30.0
-"""What an inch of a panel's height has for title and numbers [px]."""
+ABOVE = 30.0  # What an inch of a panel's height has for title and numbers [px]
 
 FINE = 2
 """Columns of curves for a pixel of a panel, so that a browser can enlarge them: each has its least and its largest sample."""
@@ -172,13 +165,11 @@ def _labels(panels: Sequence[Panel]) -> list[tuple[str, str, str]]:
     return [(kind, color, label) for kind, _, _, color, _, label in (panels[0].drawn if panels else ()) if label]
 
 
-HEAD = 20.0
-"""Room for the legend of a picture [px]."""
+HEAD = 20.0  # Room for the legend of a picture [px]
 
 SVG = "http://www.w3.org/2000/svg"
 
-UPRIGHT, NAMES = 18, 30.0
-"""Names of an axis from which on they stand upright, and their room [px]."""
+UPRIGHT, NAMES = 18, 30.0  # Names of an axis from which on they stand upright, and their room [px]
 
 
 def _text(x: float, y: float, text: str, anchor: str = "start", more: str = "") -> str:

@@ -7,23 +7,19 @@ import numpy as np
 from idbench.experiments.identification.fit import Fit
 from idbench.identify import Array, Estimate
 
-STRONG = 0.9
-"""Correlation above which two parameters are named: a change of one is then hardly told from one of the other."""
+STRONG = 0.9  # Correlation above which two parameters are named: a change of one is then hardly told from one of the other
 
 DELAY = "the delay"
 
-NAMED = 4
-"""Pairs, or parameters, that are named; of more their number is."""
+NAMED = 4  # Pairs, or parameters, that are named; of more their number is
 
 ENOUGH = 20.0
 """Length of logs [s] below which the error of the model is not well known: of fewer than ten stretches of 2 s, a standard
 deviation is known to a quarter at best."""
 
-SHOWN = 3.0
-"""Standard errors that a parameter must exceed for its scatter to be named as a share of it."""
+SHOWN = 3.0  # Standard errors that a parameter must exceed for its scatter to be named as a share of it
 
-DISTINCT = 0.05
-"""Share of its value below which the scatter of a parameter between logs is not named."""
+DISTINCT = 0.05  # Share of its value below which the scatter of a parameter between logs is not named
 
 
 def words_of_uncertainty(fit: Fit) -> Iterator[str]:

@@ -17,8 +17,7 @@ try:
 except ImportError:  # not on Windows, where two processes in one folder are noticed at the exchange of files alone
     fcntl = None  # type: ignore[assignment]
 
-RECORDING = "recording.rrd"
-"""The recording to which identifications add their layers."""
+RECORDING = "recording.rrd"  # The recording to which identifications add their layers
 
 COMMON = ("summary.json", RECORDING, "recording.*.rrd", "log*.parquet", "fault.txt")
 

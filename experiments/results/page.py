@@ -17,11 +17,9 @@ from rich.text import Text
 
 from idbench.experiments.errors import ExperimentError, visible
 
-EVERY = 15.0
-"""Time [s] between lines at the least, where there is no terminal."""
+EVERY = 15.0  # Time [s] between lines at the least, where there is no terminal
 
-LONGEST = 55.0
-"""Time [s] of a stage without a line."""
+LONGEST = 55.0  # Time [s] of a stage without a line
 
 
 class Told(Protocol):
@@ -103,15 +101,12 @@ def _lines(console: Console, what: str) -> Iterator[Told]:
         done.set()
 
 
-WIDTH = 144
-"""Characters of a line where no terminal says how many it has."""
+WIDTH = 144  # Characters of a line where no terminal says how many it has
 
 
-COLORS = {"good": "green", "fair": "yellow", "poor": "red"}
-"""Of the verdicts."""
+COLORS = {"good": "green", "fair": "yellow", "poor": "red"}  # Of the verdicts
 
-NOT_SAVED = "not saved: --out FOLDER keeps it, with a report and a recording"
-"""What is said where nobody named a folder."""
+NOT_SAVED = "not saved: --out FOLDER keeps it, with a report and a recording"  # What is said where nobody named a folder
 
 
 @final

@@ -186,8 +186,7 @@ def _is_running(process: int) -> bool:
     return True
 
 
-NAME = ".idbench.json"
-"""Name of its file in a folder."""
+NAME = ".idbench.json"  # Name of its file in a folder
 
 
 @final

@@ -17,8 +17,7 @@ from idbench.identify.servo import ServoFit
 from idbench.identify.servo.parameters import SERVO_PARAMETERS
 from idbench.sim.robot.servos import with_servos
 
-BENCH = "pendulum"
-"""Robot to whose joint a servo is written where none is named."""
+BENCH = "pendulum"  # Robot to whose joint a servo is written where none is named
 
 
 def described(

@@ -54,8 +54,7 @@ def write_commands(run: Run, robot: Robot, path: Path) -> None:
     np.savetxt(path, np.c_[run.log.t, run.command[0]], "%.6g", ",", header=header, comments="")
 
 
-AUTO = "auto"
-"""In the place of a law of friction: that which the log needs."""
+AUTO = "auto"  # In the place of a law of friction: that which the log needs
 
 
 @final

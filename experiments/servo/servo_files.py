@@ -19,8 +19,7 @@ from idbench.identify.servo.identification import with_friction
 from idbench.identify.servo.parameters import SERVO_PARAMETERS
 from idbench.sim.robot.servos import Commands, ServoValues, replay, with_servos
 
-NONE = {"rate": float("inf"), "vs": 1.0}
-"""What parameters are that a servo does not have; others are 0."""
+NONE = {"rate": float("inf"), "vs": 1.0}  # What parameters are that a servo does not have; others are 0
 
 
 def servo_function(robot: str, fits: Mapping[str, tuple[Servo, ServoFit]], logs: Sequence[str]) -> str:

@@ -18,11 +18,9 @@ from idbench.identify.servo.mistakes import EXPLAINED, REMAINING, ServoMistake
 from idbench.identify.servo.parameters import SERVO_PARAMETERS
 from idbench.identify.tables import concise
 
-ALIKE = 1.5
-"""Error on held-out logs, over that on the fitted ones, up to which a model holds."""
+ALIKE = 1.5  # Error on held-out logs, over that on the fitted ones, up to which a model holds
 
-COUNTS = 0.1
-"""Counts below which residuals are said in rad: where a log is not rounded."""
+COUNTS = 0.1  # Counts below which residuals are said in rad: where a log is not rounded
 
 CONFOUNDED = 0.9
 """Correlation from which on two parameters are hardly told apart: the error of each is then 2.3 times what it is with the other

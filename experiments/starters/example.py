@@ -15,17 +15,14 @@ from idbench.sim.engine.run import ideal_log
 from idbench.sim.trajectories import RandomMoves
 
 FS = 250.0  # [Hz], of a common robot controller
-DELAY = 0.002
-"""Sampling frequency [Hz], and delay of the torques [s], which no file of the example states."""
+DELAY = 0.002  # Sampling frequency [Hz], and delay of the torques [s], which no file of the example states
 
 NOISE = 0.01
 """Of the torques, over their own rms: a tenth of what motor currents have, so that a minute's result can be compared."""
 
-LOGS = {"log.csv": 1, "second.csv": 2}
-"""Files, and the seeds of their motions."""
+LOGS = {"log.csv": 1, "second.csv": 2}  # Files, and the seeds of their motions
 
-MOVES, VELOCITY = 5, 2.0
-"""Moves of a log for each joint, and their largest speeds [rad/s]."""
+MOVES, VELOCITY = 5, 2.0  # Moves of a log for each joint, and their largest speeds [rad/s]
 
 
 def example_files(name: str) -> dict[str, str]:

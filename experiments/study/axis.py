@@ -16,8 +16,7 @@ from idbench.experiments.requests.shared import CHAIN, ESTIMATOR
 from idbench.identify import CHAINS, ESTIMATORS, AbstractEstimator, Chain
 from idbench.sim.settings import Number, Whole, settings
 
-MOST_VALUES = 10000
-"""Values of an axis above which it is taken for a slip."""
+MOST_VALUES = 10000  # Values of an axis above which it is taken for a slip
 
 FRICTION = "friction laws"
 """Field of the axis of the laws of friction that are identified; `friction` is that of the simulated robot."""

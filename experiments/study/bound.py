@@ -8,8 +8,7 @@ from idbench.experiments.study.statistics import BOUNDS
 from idbench.identify import Array, Basis, NoiseLevels, cramer_rao
 from idbench.sim.engine.run import Run
 
-MIN_NOISE = 1e-9
-"""Noise [rad, N m] that counts as none: the bound is then that of rounding."""
+MIN_NOISE = 1e-9  # Noise [rad, N m] that counts as none: the bound is then that of rounding
 
 
 def bounds_of(basis: Basis, simulated: Run, truth: Mapping[str, float]) -> dict[str, Array]:

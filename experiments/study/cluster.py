@@ -44,8 +44,7 @@ def _version(name: str) -> str:
         return "unknown"
 
 
-PATIENCE = 10.0
-"""How long [s] a scheduler may take to answer, and workers may be away before it is said."""
+PATIENCE = 10.0  # How long [s] a scheduler may take to answer, and workers may be away before it is said
 
 QUIET = {
     "distributed.worker.profile.enabled": False,
@@ -132,8 +131,7 @@ def ready() -> dict[str, str]:
     return versions()
 
 
-DESERTED = 600.0
-"""How long [s] a study waits for workers when all have gone."""
+DESERTED = 600.0  # How long [s] a study waits for workers when all have gone
 
 
 class ClusterPool:

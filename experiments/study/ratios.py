@@ -12,8 +12,7 @@ from idbench.experiments.study.comparison import ln_typical
 from idbench.experiments.study.statistics import CONFIDENCE, Cell
 from idbench.experiments.text import new_table
 
-DRAWS = 2000
-"""Of a bootstrap: the ends of an interval are then known to some 3 % of its width."""
+DRAWS = 2000  # Of a bootstrap: the ends of an interval are then known to some 3 % of its width
 
 PAIRS = (("implicit", "explicit"), ("power", "explicit"), ("energy", "power"), ("integral", "implicit"))
 """Models that the paper compares: the one whose errors are divided, and by whose."""
@@ -27,8 +26,7 @@ NOISES = {
 }
 """Noises of the study, in words."""
 
-STATED = "idbench", "OLS"
-"""Chain and estimator whose ratios are stated one by one: the paper solves by ordinary least squares."""
+STATED = "idbench", "OLS"  # Chain and estimator whose ratios are stated one by one: the paper solves by ordinary least squares
 
 RatioRow: TypeAlias = Mapping[str, Any]
 """A ratio as `summary.json` of the study has it."""

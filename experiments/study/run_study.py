@@ -38,8 +38,7 @@ def _same(here: Mapping[str, Any], there: Mapping[str, Any], name: str) -> bool:
 
 Part = TypeVar("Part")
 
-POLL = 0.2
-"""How often [s] the progress is shown while shards are computed."""
+POLL = 0.2  # How often [s] the progress is shown while shards are computed
 
 Watch = Callable[[float], None]
 """Receives the number of runs that are done, parts of shards included."""

@@ -22,8 +22,7 @@ from idbench.sim.robot.servos import links
 from idbench.sim.scenario.scenario import Scenario
 from idbench.sim.settings import per_joint
 
-SERVO = "servo"
-"""Name of the model in results."""
+SERVO = "servo"  # Name of the model in results
 
 
 class StudiedLaw(NamedTuple):

@@ -35,11 +35,9 @@ from idbench.sim.errors import BenchError
 from idbench.sim.scenario.scenario import Scenario
 from idbench.sim.trajectories import Reference
 
-START = 5
-"""Stream of random numbers of where estimators begin."""
+START = 5  # Stream of random numbers of where estimators begin
 
-FARTHEST = 3.0
-"""Standard deviations at most by which a start is off."""
+FARTHEST = 3.0  # Standard deviations at most by which a start is off
 
 PARTS = ("", ".sigma", ".paper_sigma", ".truth")
 """Of every parameter: the estimate, its corrected sigma, that of the paper's formula, and the truth."""

@@ -27,8 +27,7 @@ from idbench.sim.trajectories import RandomMoves, RandomPace, RandomSteps
 MOST_POINTS = 1_000_000
 """Combinations of settings of simulation, above which axes are taken for a slip: each is looked at before the first is run."""
 
-MOST_METHODS = 1000
-"""Identifications of every run, above which axes are taken for a slip."""
+MOST_METHODS = 1000  # Identifications of every run, above which axes are taken for a slip
 
 PLAIN = ("name", "question", "seeds", "seed", "motion", "start", "bound", "data", "realizations", "rows")
 """Keys of a study whose values are no tables or lists."""

@@ -46,8 +46,7 @@ if TYPE_CHECKING:
     from idbench.experiments.recording.study_recording import StudyRecording
     from idbench.experiments.results.page import Page
 
-WORST = 10
-"""Runs that are listed as the worst."""
+WORST = 10  # Runs that are listed as the worst
 
 
 def report(study: Study, cells: Sequence[Cell], seconds: dict[str, float], folder: Path) -> str:
@@ -185,8 +184,7 @@ def _differences(cells: Sequence[Cell]) -> Iterator[list[str]]:
             yield [title, method(d.better, cells), method(d.worse, cells), f"{d.ratio:.3g}", f"{d.p:.1g}", f"{d.runs}"]
 
 
-MOST_REASONS = 3
-"""Reasons of failures that are printed; the report has all."""
+MOST_REASONS = 3  # Reasons of failures that are printed; the report has all
 
 
 def write_results(page: "Page", store: Store, folder: ResultsFolder, recording: "StudyRecording | None") -> None:

@@ -26,11 +26,9 @@ Kind = Literal[
     "other",
 ]
 
-BODY: frozenset[Kind] = frozenset({"inertia", "first moment", "mass"})
-"""Kinds of parameters of a rigid body."""
+BODY: frozenset[Kind] = frozenset({"inertia", "first moment", "mass"})  # Kinds of parameters of a rigid body
 
-RIGID: frozenset[Kind] = BODY | {"rotor inertia"}
-"""Kinds of parameters of what has inertia."""
+RIGID: frozenset[Kind] = BODY | {"rotor inertia"}  # Kinds of parameters of what has inertia
 
 FRICTION: frozenset[Kind] = frozenset(
     {"viscous friction", "Coulomb friction", "friction", "shape of friction", "smooth friction"}

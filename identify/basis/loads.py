@@ -58,8 +58,7 @@ class DriveGains(AbstractJointLaw):
         return replace(self, model=model, X=X[..., [basis.places[parameter] for parameter in model.parameters]])
 
 
-HELD_SHARE = "payload"
-"""Condition of a log: the share of the payload that is held, 0 without and 1 with it."""
+HELD_SHARE = "payload"  # Condition of a log: the share of the payload that is held, 0 without and 1 with it
 
 
 @final

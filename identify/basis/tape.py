@@ -46,8 +46,7 @@ OPERATIONS: dict[Any, str] = {
 NUMBERS: dict[str, Callable[..., Any]] = {name: function for function, name in OPERATIONS.items()} | {"where": np.where}
 """Operations -> what they are of numbers."""
 
-WHOLE = 4
-"""Powers up to this are products."""
+WHOLE = 4  # Powers up to this are products
 
 Step: TypeAlias = tuple[Any, ...]
 """An operation and what it takes: numbers of earlier steps (int), or constants (float). Of an input, where it comes from."""

@@ -13,17 +13,14 @@ from idbench.identify.arrays import Array
 from idbench.identify.data.log_columns import LogColumns
 from idbench.identify.errors import LogError
 
-LONGEST = 0.05
-"""Time [s] without a row beyond which a log is cut: what a robot does meanwhile nobody knows."""
+LONGEST = 0.05  # Time [s] without a row beyond which a log is cut: what a robot does meanwhile nobody knows
 
-STEADY = 0.01
-"""Departure of a time step from the mean step, as a share of it, up to which stamps are as good as a steady clock."""
+STEADY = 0.01  # Departure of a time step from the mean step, as a share of it, up to which stamps are as good as a steady clock
 
 ROUGHER = 0.95
 """Share of a clock's roughness that another must leave less than to be believed: stamps first, then a steady clock."""
 
-MIN_ROWS = 20
-"""Rows that it takes."""
+MIN_ROWS = 20  # Rows that it takes
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,14 +11,11 @@ import scipy
 
 from idbench.identify.arrays import Array
 
-OFF = 0.05
-"""Share of a step by which a difference of positions may miss a whole number of steps: files are rounded."""
+OFF = 0.05  # Share of a step by which a difference of positions may miss a whole number of steps: files are rounded
 
-MIN_DIFFERENCES = 20
-"""Differences that it takes."""
+MIN_DIFFERENCES = 20  # Differences that it takes
 
-MAX_STEPS = 1000
-"""Steps of a difference up to which rounding of the step itself does not matter."""
+MAX_STEPS = 1000  # Steps of a difference up to which rounding of the step itself does not matter
 
 
 def encoder_steps(q: Array) -> Array:
@@ -63,20 +60,15 @@ def _refined(found: Array, step: float) -> float:
 COMMON = 0.99
 """Share of the steps from one sample to the next that are below what is usual: those above may be the fastest of a motion."""
 
-NEAR = 2
-"""Steps to either side that a step is compared with."""
+NEAR = 2  # Steps to either side that a step is compared with
 
-SPREAD = 3.0
-"""A step jumps if it is farther from the median of its neighbours than this many times their scatter."""
+SPREAD = 3.0  # A step jumps if it is farther from the median of its neighbours than this many times their scatter
 
-RETURN = 0.2
-"""Share of a jump that may be left after it has gone back."""
+RETURN = 0.2  # Share of a jump that may be left after it has gone back
 
-ROUNDING = 1e-3
-"""Share of the largest travel of a joint that no jump is below."""
+ROUNDING = 1e-3  # Share of the largest travel of a joint that no jump is below
 
-COUNTS = 2.5
-"""Steps of its encoder that no jump is below: quiet joints tremble by one, and creep by one after the other."""
+COUNTS = 2.5  # Steps of its encoder that no jump is below: quiet joints tremble by one, and creep by one after the other
 
 
 @final
@@ -146,20 +138,15 @@ def _of_joint(j: int, x: Array, least: float, fs: float) -> list[Jump]:
     return found
 
 
-BAND = 5.0
-"""Frequency [Hz] up to which velocities are compared with differences."""
+BAND = 5.0  # Frequency [Hz] up to which velocities are compared with differences
 
-ALIKE = 0.03
-"""Departure of velocities from differences, as a share, up to which they are in the same unit."""
+ALIKE = 0.03  # Departure of velocities from differences, as a share, up to which they are in the same unit
 
-LATE = 0.5
-"""Delay of velocities, in sampling periods, up to which they are of the same instants."""
+LATE = 0.5  # Delay of velocities, in sampling periods, up to which they are of the same instants
 
-ORDER = 6
-"""Differences of a signal after which next to nothing of a motion is left, and of white noise much."""
+ORDER = 6  # Differences of a signal after which next to nothing of a motion is left, and of white noise much
 
-HIGHEST = 10.0
-"""Frequency [Hz] above which less noisy velocities do not matter: little of a motion is there."""
+HIGHEST = 10.0  # Frequency [Hz] above which less noisy velocities do not matter: little of a motion is there
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,14 +11,12 @@ from idbench.identify.errors import KinematicsError, SettingError
 
 Kind = Literal["hinge", "slide"]
 
-GROUND = -1
-"""Number of the parent of a joint that stands on the ground."""
+GROUND = -1  # Number of the parent of a joint that stands on the ground
 
 INERTIAL = ("XX", "XY", "XZ", "YY", "YZ", "ZZ", "MX", "MY", "MZ", "M")
 """Letters of a link's ten parameters: inertia matrix about the origin of its frame, first moments, mass."""
 
-ROUNDING = 1e-12
-"""Entries of rotations and axes below this are rounding, and zero."""
+ROUNDING = 1e-12  # Entries of rotations and axes below this are rounding, and zero
 
 
 @final
@@ -147,8 +145,7 @@ def _clean(values: Array) -> Array:
     return np.where(near, np.round(values), values) + 0.0
 
 
-MIN_LIMIT = 1e-6
-"""Limits below this are a slip."""
+MIN_LIMIT = 1e-6  # Limits below this are a slip
 
 
 @dataclass(frozen=True, eq=False)

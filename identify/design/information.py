@@ -54,8 +54,7 @@ def predicted_information(log: MotionLog, basis: Basis, X: Array, levels: NoiseL
 SLOW, TURNING = 0.1, 0.06
 """Speed [rad/s] below which a joint's rows count little, and time [s] about its reversals: masks leave them out."""
 
-STEP = 1e-6
-"""Step [rad, rad/s] of differences of columns; accelerations enter them linearly, so that theirs are exact."""
+STEP = 1e-6  # Step [rad, rad/s] of differences of columns; accelerations enter them linearly, so that theirs are exact
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,17 +13,13 @@ from idbench.identify.design.information import Information
 from idbench.identify.design.plan import Plan
 from idbench.identify.design.shapes import quintic
 
-POOL = 200
-"""Moves to choose from, each time."""
+POOL = 200  # Moves to choose from, each time
 
-INSTANTS = 8
-"""States of a move."""
+INSTANTS = 8  # States of a move
 
-FIRST = 1e-3
-"""Share of a move's information that counts as known before the first: it makes the matrix regular."""
+FIRST = 1e-3  # Share of a move's information that counts as known before the first: it makes the matrix regular
 
-PEAKS = 15 / 8, 10 / np.sqrt(3)
-"""Largest velocity and acceleration of a fifth-order move of unit length and time."""
+PEAKS = 15 / 8, 10 / np.sqrt(3)  # Largest velocity and acceleration of a fifth-order move of unit length and time
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,8 +71,7 @@ class Greedy:
         return information.matrix(information.weighted(motion))
 
 
-MEMORY = 20
-"""Steps that L-BFGS remembers."""
+MEMORY = 20  # Steps that L-BFGS remembers
 
 
 class DesignSearch:

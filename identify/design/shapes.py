@@ -8,8 +8,7 @@ import numpy as np
 from idbench.identify.arrays import Array
 from idbench.identify.errors import SettingError
 
-ORDERS = 4
-"""Position, velocity, acceleration, jerk."""
+ORDERS = 4  # Position, velocity, acceleration, jerk
 
 
 @dataclass(frozen=True, eq=False)

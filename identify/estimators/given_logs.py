@@ -5,8 +5,7 @@ from collections.abc import Sequence
 from idbench.identify.data.motion_log import MotionLog
 from idbench.identify.errors import LogError
 
-ROUNDING = 1e-9
-"""Share by which frequencies may differ that are the same: of a file they are the mean of its steps."""
+ROUNDING = 1e-9  # Share by which frequencies may differ that are the same: of a file they are the mean of its steps
 
 
 def same_form(one: MotionLog, other: MotionLog) -> bool:

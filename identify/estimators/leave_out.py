@@ -11,11 +11,9 @@ import numpy.typing as npt
 from idbench.identify.arrays import Array
 from idbench.identify.estimators.log_rows import LogRows
 
-STRETCH = 2.0
-"""Length of a stretch [s]: residuals of real robots are correlated over 0.2 to 3 s."""
+STRETCH = 2.0  # Length of a stretch [s]: residuals of real robots are correlated over 0.2 to 3 s
 
-FEWEST = 5
-"""Stretches at least; those of short logs are shorter."""
+FEWEST = 5  # Stretches at least; those of short logs are shorter
 
 RIDGE, NOTHING = 1e-11, 1e-200
 """Share of its diagonal that is added to a matrix of products, so that what the other stretches do not show stays zero; squares

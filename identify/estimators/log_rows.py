@@ -25,8 +25,7 @@ if TYPE_CHECKING:
     from idbench.identify.estimators.problem import Problem
 
 
-DELAY_STEP = 1e-4
-"""Half the difference of delays [s]: small beside a sample, large beside the rounding of an interpolation."""
+DELAY_STEP = 1e-4  # Half the difference of delays [s]: small beside a sample, large beside the rounding of an interpolation
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,8 +185,7 @@ def delay_covariance(parts: Sequence[LogRows], influence: Sequence[Array]) -> Ar
     return np.asarray(sum(slope[..., :, None] * slope[..., None, :] for slope in slopes.values()))
 
 
-MOVED = 0.02
-"""Sigma by which what noise adds to W may move an estimate of long logs for it to be left there."""
+MOVED = 0.02  # Sigma by which what noise adds to W may move an estimate of long logs for it to be left there
 
 Piece = tuple[Chain, MotionLog, tuple[int, int]]
 """A chain, a log, first sample and end of a piece of it."""

@@ -18,14 +18,11 @@ from idbench.identify.files.table import LogTable, require_room
 if TYPE_CHECKING:
     import pyarrow as pa
 
-TORQUE = b"idbench.torque"
-"""Key of what a Parquet file says of its torque."""
+TORQUE = b"idbench.torque"  # Key of what a Parquet file says of its torque
 
-BOM = b"\xef\xbb\xbf"
-"""How some programs begin a file of UTF-8."""
+BOM = b"\xef\xbb\xbf"  # How some programs begin a file of UTF-8
 
-LARGEST = 2**53
-"""Integers up to this are numbers of double precision."""
+LARGEST = 2**53  # Integers up to this are numbers of double precision
 
 NUMBER = r"[-+.\deE,]*\d[-+.\deE,]*|[-+]?(nan|inf|infinity)"
 

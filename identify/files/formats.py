@@ -11,8 +11,7 @@ from idbench.identify.files.lerobot import data_file, is_data_set
 from idbench.identify.files.ros_bag import read_bag
 from idbench.identify.files.table import LogTable
 
-TEXT = (".csv", ".txt", ".tsv", ".dat")
-"""What names of text files end with."""
+TEXT = (".csv", ".txt", ".tsv", ".dat")  # What names of text files end with
 
 FORMATS: dict[str, Callable[[Path], LogTable]] = {
     **dict.fromkeys(TEXT, read_text),
@@ -50,8 +49,7 @@ def require_file(path: Path) -> None:
         raise LogError(f"{path} is {what}: a log is read more than once; write it to a file, such as log.csv, and name that")
 
 
-ROBOTS = (".urdf", ".mjcf", ".xacro", ".sdf")
-"""Endings of files of robots, which are easily given in the place of a log."""
+ROBOTS = (".urdf", ".mjcf", ".xacro", ".sdf")  # Endings of files of robots, which are easily given in the place of a log
 
 
 def read_table(path: Path) -> LogTable:

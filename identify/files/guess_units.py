@@ -11,11 +11,9 @@ from idbench.identify.files.table import SI, LogTable, factor, named_unit
 
 CURRENTS = ("current", "currents", "cur", "amps")
 
-FARTHEST = 4 * np.pi
-"""Positions [rad] beyond which degrees are suspected."""
+FARTHEST = 4 * np.pi  # Positions [rad] beyond which degrees are suspected
 
-STRONGEST = 3e3
-"""Torques [N m] beyond which mN m are suspected."""
+STRONGEST = 3e3  # Torques [N m] beyond which mN m are suspected
 
 
 def with_units(layout: LogLayout, table: LogTable) -> tuple[LogLayout, list[str]]:

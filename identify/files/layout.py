@@ -18,20 +18,15 @@ OF_SERVOS = ("command", "forward", "on", "voltage")
 """What columns of logs of servos may be beside: commanded positions, what is commanded beside them, whether torque is on, and
 the supply."""
 
-QUANTITIES = ("t", "q", "qd", "tau", "temperature", *OF_SERVOS)
-"""What columns may be."""
+QUANTITIES = ("t", "q", "qd", "tau", "temperature", *OF_SERVOS)  # What columns may be
 
-UNLOGGED = ""
-"""Name of the column of a joint of which a quantity was not logged."""
+UNLOGGED = ""  # Name of the column of a joint of which a quantity was not logged
 
-SINGULAR = 1e-12
-"""Determinants below this are none."""
+SINGULAR = 1e-12  # Determinants below this are none
 
-SLOWEST, FASTEST = 1e-3, 1e7
-"""Sampling frequencies [Hz] outside of which a slip is suspected."""
+SLOWEST, FASTEST = 1e-3, 1e7  # Sampling frequencies [Hz] outside of which a slip is suspected
 
-LAYOUT = "log.toml"
-"""Name of the file that says what all logs of its folder hold."""
+LAYOUT = "log.toml"  # Name of the file that says what all logs of its folder hold
 
 
 @dataclass(frozen=True)

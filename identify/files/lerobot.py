@@ -5,11 +5,9 @@ from pathlib import Path
 
 from idbench.identify.errors import LogError
 
-INFO = Path("meta") / "info.json"
-"""What describes a data set."""
+INFO = Path("meta") / "info.json"  # What describes a data set
 
-SUFFIX = ".pos"
-"""What names of its joints end with."""
+SUFFIX = ".pos"  # What names of its joints end with
 
 
 def data_file(folder: Path) -> Path:

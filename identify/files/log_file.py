@@ -11,15 +11,12 @@ from idbench.identify.errors import LogError
 from idbench.identify.files.arrow import TORQUE, arrow
 from idbench.identify.files.reading import read_columns
 
-CSV = ".csv"
-"""What the name of a CSV file ends with."""
+CSV = ".csv"  # What the name of a CSV file ends with
 
-WRITTEN = (CSV, ".parquet")
-"""What names of files end with that idbench writes."""
+WRITTEN = (CSV, ".parquet")  # What names of files end with that idbench writes
 
 
-COLUMNS = ("temperature", "command", "on")
-"""Conditions that have columns."""
+COLUMNS = ("temperature", "command", "on")  # Conditions that have columns
 
 
 def write_log(log: MotionLog, path: Path | str, joints: Sequence[str] = ()) -> None:

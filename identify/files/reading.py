@@ -17,14 +17,11 @@ from idbench.identify.files.layout import LAYOUT, UNLOGGED, LogLayout, Source, m
 from idbench.identify.files.standard import standard_layout
 from idbench.identify.files.table import SI, LogTable, needs_gain
 
-CLOCKS = 1e6
-"""Times [s] beyond this are those of a calendar: logs count from their beginning."""
+CLOCKS = 1e6  # Times [s] beyond this are those of a calendar: logs count from their beginning
 
-MIN_GAIN, MAX_GAIN = 1e-9, 1e9
-"""Sizes of gains beyond which they are slips."""
+MIN_GAIN, MAX_GAIN = 1e-9, 1e9  # Sizes of gains beyond which they are slips
 
-LAYOUT_FILE = ".toml"
-"""What the name of a layout ends with, which may be given in the place of a log."""
+LAYOUT_FILE = ".toml"  # What the name of a layout ends with, which may be given in the place of a log
 
 
 def read_columns(path: Path, layout: LogLayout | None = None) -> LogColumns:

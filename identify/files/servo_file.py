@@ -16,23 +16,19 @@ from idbench.identify.servo.law import KINDS, PUBLISHED, Servo, TimeSteps
 GAIN_UNITS = {"1/rad": 1.0, "1/deg": 180 / np.pi, "1/count": 0.0}
 """Units of a gain, duty per unit of kp and of error, and what makes 1/rad of it; counts depend on the encoder."""
 
-LIMITS = tuple(kind.limit for kind in KINDS.values())
-"""What the limit of a loop is called, by its kind."""
+LIMITS = tuple(kind.limit for kind in KINDS.values())  # What the limit of a loop is called, by its kind
 
 KEYS = ("model", "gain_unit", *(field.name for field in fields(Servo) if field.name not in ("limit", "steps")), *LIMITS)
 """What a servo may state."""
 
-WORDS = ("model", "gain_unit", "kind")
-"""Of these, what is no number."""
+WORDS = ("model", "gain_unit", "kind")  # Of these, what is no number
 
-COUNTS = 4096
-"""Counts of a servo's encoder that are assumed where neither they nor a model are stated, as of most."""
+COUNTS = 4096  # Counts of a servo's encoder that are assumed where neither they nor a model are stated, as of most
 
 MAX_OVER_SUPPLY = 1.5
 """Times the largest supply of a datasheet from which on another unit is suspected: people do run servos a little above it."""
 
-ROBOT = "robot"
-"""What a log may state beside: the robot, links and load, that it is of."""
+ROBOT = "robot"  # What a log may state beside: the robot, links and load, that it is of
 
 
 @final

@@ -27,8 +27,7 @@ USUAL: Mapping[str, tuple[str, ...]] = {
 }
 """How columns are called where nobody says otherwise; those of LeRobot last."""
 
-NAME_IT = "Name it: --columns command=NAME, a * in it for numbers or names of joints"
-"""The way out where a column is not found."""
+NAME_IT = "Name it: --columns command=NAME, a * in it for numbers or names of joints"  # The way out where a column is not found
 
 OPTIONAL = ("forward", "on", "voltage")
 

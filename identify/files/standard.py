@@ -8,8 +8,7 @@ from idbench.identify.files.guess import kind_of
 from idbench.identify.files.layout import UNLOGGED, LogLayout, Source
 from idbench.identify.files.table import LogTable
 
-SHOWN = 20
-"""Columns of a file that a message names."""
+SHOWN = 20  # Columns of a file that a message names
 
 
 def standard_layout(path: Path, table: LogTable) -> LogLayout:

@@ -60,8 +60,7 @@ SI = {
 }
 """Units that are taken where a file states none; those of slides are m and N, which are of the same size."""
 
-NEED_GAIN = ("A", "mA", "%")
-"""Units of efforts that a gain makes torques [N m] of: gain is N m/A, or N m at 100 %."""
+NEED_GAIN = ("A", "mA", "%")  # Units of efforts that a gain makes torques [N m] of: gain is N m/A, or N m at 100 %
 
 
 def factor(quantity: str, unit: str) -> float:
@@ -94,8 +93,7 @@ def _plain(unit: str) -> str:
     return short.get(text.lower(), text)
 
 
-COPIES = 3
-"""How often the values of a log are in memory at once while it is read and turned into SI."""
+COPIES = 3  # How often the values of a log are in memory at once while it is read and turned into SI
 
 
 def require_room(path: Path, what: str, size: int) -> None:

@@ -13,13 +13,11 @@ from idbench.identify.estimators.likelihood.reversals import CREEP
 from idbench.identify.noise.linearization import friction_jumps, observation, slopes
 from idbench.identify.noise.propagation import NoiseLevels
 
-AT_REST = 1e-3
-"""Share of a joint's rms speed below which it counts as at rest: a simulated contact creeps."""
+AT_REST = 1e-3  # Share of a joint's rms speed below which it counts as at rest: a simulated contact creeps
 
 Index = Any
 
-TERMS = 8
-"""Terms of the exponential series: slopes times a period are well below 1."""
+TERMS = 8  # Terms of the exponential series: slopes times a period are well below 1
 
 
 def cramer_rao(basis: Basis, X: Array, q: Array, qd: Array, fs: float, noise: NoiseLevels, *, reversals: bool = False) -> Array:

@@ -23,17 +23,13 @@ RANGE = (-0.02, 0.05)
 WIDER, FARTHEST = 3.0, 0.6
 """How many times farther each further look goes, and how far at most [s]: two clocks of a recorder may be that far apart."""
 
-SHARE = 0.05
-"""Share of a log that a delay may be: its rows must lie inside the log at all delays."""
+SHARE = 0.05  # Share of a log that a delay may be: its rows must lie inside the log at all delays
 
-ROUNDS, SETTLED = 10, 0.1
-"""Newton steps at most, and share of a sigma below which the last one must be: 1 % of sigma^2."""
+ROUNDS, SETTLED = 10, 0.1  # Newton steps at most, and share of a sigma below which the last one must be: 1 % of sigma^2
 
-DIFFERENT = 0.01
-"""Probability, of logs with one delay, below which their delays count as different."""
+DIFFERENT = 0.01  # Probability, of logs with one delay, below which their delays count as different
 
-_COARSE = 15
-"""Delays of a first look, which brackets the smallest misfit."""
+_COARSE = 15  # Delays of a first look, which brackets the smallest misfit
 
 
 @dataclass(frozen=True)

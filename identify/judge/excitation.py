@@ -49,14 +49,11 @@ def _keys(log: MotionLog | LogColumns) -> npt.NDArray[np.void]:
     return rows.view([("", rows.dtype)] * rows.shape[1]).ravel()
 
 
-TELLING = 1e-6
-"""Variance of a direction of the difference, over the largest, below which it is rounding."""
+TELLING = 1e-6  # Variance of a direction of the difference, over the largest, below which it is rounding
 
-LEVEL = 0.05
-"""Probability of a difference that large by chance, below which it is said to be real."""
+LEVEL = 0.05  # Probability of a difference that large by chance, below which it is said to be real
 
-MATTERS = 0.5
-"""Difference in sigma from which on it matters: half a sigma of bias makes 95 % intervals hold the truth in 92 %."""
+MATTERS = 0.5  # Difference in sigma from which on it matters: half a sigma of bias makes 95 % intervals hold the truth in 92 %
 
 
 class NoiseInRows(NamedTuple):
@@ -110,14 +107,11 @@ def noise_in_rows(estimate: Estimate) -> NoiseInRows:
     return NoiseInRows(statistic, freedom, probability, (plain.X - estimate.X) / best)
 
 
-ENOUGH = 0.2
-"""Share of what a parameter adds of its own to the torques while all joints move, from which some of them will do."""
+ENOUGH = 0.2  # Share of what a parameter adds of its own to the torques while all joints move, from which some of them will do
 
-MOST_JOINTS = 3
-"""Joints of a move; what takes more of them counts as needing all."""
+MOST_JOINTS = 3  # Joints of a move; what takes more of them counts as needing all
 
-STATES = 200
-"""Random states of a move."""
+STATES = 200  # Random states of a move
 
 
 def showing_moves(tree: KinematicTree, grouping: BaseParameters, names: Sequence[str]) -> dict[str, tuple[int, ...]]:

@@ -18,21 +18,17 @@ from idbench.identify.estimators.problem import Problem
 from idbench.identify.estimators.settle import Candidates
 from idbench.identify.rows.factors import Status
 
-GRID = 32
-"""Values of each unknown shape of a law that are compared."""
+GRID = 32  # Values of each unknown shape of a law that are compared
 
-LOOKED = 4
-"""Of these, those that explain all rows best are compared on rows that are left out."""
+LOOKED = 4  # Of these, those that explain all rows best are compared on rows that are left out
 
-FOLDS = 10
-"""Stretches of the logs, each of which is predicted by a fit of the others."""
+FOLDS = 10  # Stretches of the logs, each of which is predicted by a fit of the others
 
 FAST = 0.8
 """Speeds of a joint above this share of the rows are predicted once more, by a fit of the slower ones: a law that holds within
 the speeds of a fit alone fails there."""
 
-TINY = 1e-300
-"""Squares below this count as it."""
+TINY = 1e-300  # Squares below this count as it
 
 
 @dataclass(frozen=True, eq=False)

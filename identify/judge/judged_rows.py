@@ -16,8 +16,7 @@ from idbench.identify.signals.masks import AbstractMask, NoMask, ReversalMask
 from idbench.identify.signals.signals import Signals
 from idbench.identify.signals.spectra import gain_of, welch
 
-FEW = 0.1
-"""Share of the sum of an operator's weights, by size, that their sum must be for rows to say what a constant becomes."""
+FEW = 0.1  # Share of the sum of an operator's weights, by size, that their sum must be for rows to say what a constant becomes
 
 
 def as_judged(problem: Problem) -> Problem:
@@ -56,17 +55,13 @@ class _WhereItMoves(AbstractMask):
         return np.where((weight == 0).all(axis=-1, keepdims=True), 1.0, weight)
 
 
-RESOLUTION = 0.5
-"""Distance of the frequencies that are looked at [Hz]."""
+RESOLUTION = 0.5  # Distance of the frequencies that are looked at [Hz]
 
-QUIET = 0.02
-"""Gain of the operator, as a share of that at rest, below which a frequency is above its band."""
+QUIET = 0.02  # Gain of the operator, as a share of that at rest, below which a frequency is above its band
 
-MIN_FREQUENCIES = 8
-"""Frequencies above the band that it takes to distinguish two kinds of noise."""
+MIN_FREQUENCIES = 8  # Frequencies above the band that it takes to distinguish two kinds of noise
 
-FAINT = 1e-2
-"""Frequencies at which a kind of noise is below this share of its largest say nothing of it."""
+FAINT = 1e-2  # Frequencies at which a kind of noise is below this share of its largest say nothing of it
 
 
 def row_noise(left: Instants, signals: Signals, chain: Chain) -> Array:

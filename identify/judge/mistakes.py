@@ -60,8 +60,7 @@ class Mistake(NamedTuple):
     """Whether nothing makes a size below zero, which then is noise of the positions: compliance, play, an inertia, a load."""
 
 
-GAIN = Mistake("gain", of_joint(lambda m, j: m.torque[j]), most=1.0, left=1e-6)
-"""Torques that are all too large."""
+GAIN = Mistake("gain", of_joint(lambda m, j: m.torque[j]), most=1.0, left=1e-6)  # Torques that are all too large
 
 OF_JOINTS: tuple[Mistake, ...] = (
     GAIN,

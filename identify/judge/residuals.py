@@ -16,8 +16,7 @@ from idbench.identify.rows.row_map import Kernel
 from idbench.identify.signals.signals import Signals, State
 from idbench.identify.signals.spectra import gain_of, welch
 
-EVERY = 50.0
-"""Frequency of the instants over which the robot's slopes are averaged [Hz]."""
+EVERY = 50.0  # Frequency of the instants over which the robot's slopes are averaged [Hz]
 
 
 def noise_spectra(problem: Problem, levels: NoiseLevels, f: Array) -> tuple[Array, Array]:
@@ -66,8 +65,7 @@ def noise_spectra(problem: Problem, levels: NoiseLevels, f: Array) -> tuple[Arra
     return np.sqrt(2 / fs) * levels.torque[:, None] * aligned, np.sqrt(2 / fs) * of_position
 
 
-HALF = 0.5
-"""A filter's cut-off is where its gain has fallen to this share: -6 dB."""
+HALF = 0.5  # A filter's cut-off is where its gain has fallen to this share: -6 dB
 
 
 @dataclass(frozen=True, eq=False)

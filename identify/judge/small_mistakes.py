@@ -28,26 +28,19 @@ WORTH, MATTERS = 0.98, 0.02
 """Share of an error on stretches that were not fitted that a mistake may leave, and error [%] below which none matters: a chain
 has errors of its own, of some 1e-5 %, and no drive is known to a fiftieth of a per cent."""
 
-PUSHED = 0.02
-"""Torque of a push, over the rms of the joint's, above which it is one: less is what any model leaves somewhere."""
+PUSHED = 0.02  # Torque of a push, over the rms of the joint's, above which it is one: less is what any model leaves somewhere
 
-ALIKE = 0.8
-"""Share of what a mistake explains that another one must explain to be its alternative."""
+ALIKE = 0.8  # Share of what a mistake explains that another one must explain to be its alternative
 
-MOST = 3
-"""Mistakes that are looked for, one beside the other."""
+MOST = 3  # Mistakes that are looked for, one beside the other
 
-MEDIAN = 0.4549
-"""Of chi squared with one degree of freedom."""
+MEDIAN = 0.4549  # Of chi squared with one degree of freedom
 
-FEWEST, MANY = 2, 100_000
-"""Rows a parameter, and rows at most: hundreds of columns of as many take a GB."""
+FEWEST, MANY = 2, 100_000  # Rows a parameter, and rows at most: hundreds of columns of as many take a GB
 
-ROUNDS = 5
-"""Of the gain of a torque, which is not small where a constant is wrong by tenths."""
+ROUNDS = 5  # Of the gain of a torque, which is not small where a constant is wrong by tenths
 
-SOME = 6
-"""One of so many tests is made whatever it says, to see how they scatter."""
+SOME = 6  # One of so many tests is made whatever it says, to see how they scatter
 
 
 def small_mistakes(problem: Problem, X: Array) -> tuple[Suspect, ...]:

@@ -8,8 +8,7 @@ from idbench.identify.estimators.log_rows import LogRows
 from idbench.identify.estimators.problem import Problem
 from idbench.identify.rows.factors import CONVERGED
 
-MEMORY = 3.0
-"""Time [s] over which residuals are correlated: 0.2 to 3 s on real robots."""
+MEMORY = 3.0  # Time [s] over which residuals are correlated: 0.2 to 3 s on real robots
 
 
 def held_out_errors(problem: Problem) -> Array:

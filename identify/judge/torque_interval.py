@@ -13,8 +13,7 @@ from idbench.identify.estimators.problem import Problem
 from idbench.identify.judge.used_rows import UsedRows
 from idbench.identify.signals.signals import Signals
 
-LEVEL = 0.95
-"""Share of torques that intervals shall contain."""
+LEVEL = 0.95  # Share of torques that intervals shall contain
 
 OTHER_MOTION = 1.3
 """How much larger errors are on another motion than on stretches left out of the fitted one. No theorem: on 24 pairs of real

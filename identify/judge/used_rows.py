@@ -16,11 +16,9 @@ from idbench.identify.rows.operators import FirLowPass
 from idbench.identify.signals.masks import NoMask, slow_speed
 from idbench.identify.signals.prefilters import FirPrefilter
 
-BAND = 10.0
-"""Frequency [Hz] up to which torques are judged: what drives and controllers of arms use of a model."""
+BAND = 10.0  # Frequency [Hz] up to which torques are judged: what drives and controllers of arms use of a model
 
-OF_NYQUIST = 0.4
-"""Share of the Nyquist frequency above which no band goes: filters and differences need room."""
+OF_NYQUIST = 0.4  # Share of the Nyquist frequency above which no band goes: filters and differences need room
 
 
 @final

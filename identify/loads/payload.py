@@ -20,11 +20,9 @@ from idbench.identify.loads.loaded_robot import LETTERS, LoadedRobot, marked, of
 from idbench.identify.models import ExplicitModel
 from idbench.identify.parameters.bodies import inertial, pseudo_inertia
 
-REPEATED = 0.05
-"""Rms distance of two motions [rad or m] up to which they count as one that was repeated."""
+REPEATED = 0.05  # Rms distance of two motions [rad or m] up to which they count as one that was repeated
 
-MIN_EIGENVALUE = 1e-6
-"""Least eigenvalue of a body's pseudo-inertia, as a share of the largest."""
+MIN_EIGENVALUE = 1e-6  # Least eigenvalue of a body's pseudo-inertia, as a share of the largest
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,8 +11,7 @@ from scipy.linalg import blas, lapack
 from idbench.identify.arrays import Array
 from idbench.identify.errors import IdentificationError
 
-BLOCK, TOGETHER = 64, 32
-"""Unknowns that are solved for at once, at least, and blocks that are copied at once."""
+BLOCK, TOGETHER = 64, 32  # Unknowns that are solved for at once, at least, and blocks that are copied at once
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,8 +17,7 @@ from idbench.identify.signals.spectra import parabola
 STEP_Q, STEP_QD = 1e-3, 0.05
 """Steps [rad, rad/s] of central differences: torques are sines of positions, and squares of velocities."""
 
-SMOOTHING = 0.15
-"""Time [s] over which velocities are smoothed, by parabolas, before noise is propagated through them."""
+SMOOTHING = 0.15  # Time [s] over which velocities are smoothed, by parabolas, before noise is propagated through them
 
 KNOTS = 25.0
 """Frequency [Hz] at which slopes are computed; between them cubics go through them, since motion has little beyond 5 Hz."""

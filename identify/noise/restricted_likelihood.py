@@ -19,26 +19,21 @@ from idbench.identify.noise.white_noise import EXACT
 from idbench.identify.rows.factors import Factor, triangular
 from idbench.identify.rows.rows import Rows
 
-ROUNDS, SETTLED = 20, 0.01
-"""Rounds at most, and change, in all that the levels make of the rows, at which they count as found."""
+ROUNDS, SETTLED = 20, 0.01  # Rounds at most, and change, in all that the levels make of the rows, at which they count as found
 
-STILL = 0.02
-"""Change of X, in its sigma, at which the levels count as found."""
+STILL = 0.02  # Change of X, in its sigma, at which the levels count as found
 
 HASTY, HASTE = 1, 1.5
 """Rounds in which a square is multiplied by a power of the ratio: more than 1 is faster, 2 might swing for ever."""
 
-FARTHEST = 64.0
-"""What a square is multiplied or divided by at most in one of the other rounds."""
+FARTHEST = 64.0  # What a square is multiplied or divided by at most in one of the other rounds
 
 RIDGE = 1e-6
 """Share of its own that is added to the information about each square: two that do the same to rows are both left there."""
 
-LOWEST = 1e-3
-"""Share of the torque's rms at which its noise begins at least: what begins at nothing hardly grows."""
+LOWEST = 1e-3  # Share of the torque's rms at which its noise begins at least: what begins at nothing hardly grows
 
-SMALLEST = 1e-9
-"""Noise of positions [rad] at least: rounding, of a log in single precision."""
+SMALLEST = 1e-9  # Noise of positions [rad] at least: rounding, of a log in single precision
 
 
 def likely_levels(

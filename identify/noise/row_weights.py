@@ -13,11 +13,9 @@ from idbench.identify.rows.row_map import RowMap
 from idbench.identify.rows.rows import Rows
 from idbench.identify.signals.signals import Signals
 
-ROUNDS = 6
-"""Iterations: each takes nine tenths of the error away."""
+ROUNDS = 6  # Iterations: each takes nine tenths of the error away
 
-FAINT = 1e-3
-"""Expectations below this share of the mean count as this: what is found there says more about the expectation."""
+FAINT = 1e-3  # Expectations below this share of the mean count as this: what is found there says more about the expectation
 
 
 def two_levels(x: Array, z: Array, squares: Array) -> tuple[Array, Array]:
@@ -53,8 +51,7 @@ def _not_negative(x: Array, z: Array, y: Array) -> tuple[Array, Array]:
     return np.where(b < 0, of_x, np.maximum(a, 0.0)), np.where(a < 0, of_z, np.maximum(b, 0.0))
 
 
-SURE = 4.0
-"""Speed over the noise of the velocity at which a joint is certain to move the way it seems to."""
+SURE = 4.0  # Speed over the noise of the velocity at which a joint is certain to move the way it seems to
 
 
 def unbiased(rows: Rows, noisier: Rows) -> Rows:

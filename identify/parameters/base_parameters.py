@@ -17,11 +17,9 @@ from idbench.identify.signals.signals import State
 STATES = 56
 """Random states for each joint: four for each of its fourteen standard parameters, with a rotor and three laws of friction."""
 
-ENOUGH = 4
-"""Joints beyond which more of them need no more states."""
+ENOUGH = 4  # Joints beyond which more of them need no more states
 
-SEED = 0
-"""Of the random states: any others give the same grouping, up to rounding."""
+SEED = 0  # Of the random states: any others give the same grouping, up to rounding
 
 DEPENDENT = 1e-3
 """A column counts as a combination of those before it when its residual is below this share of a long column of its unit.
@@ -32,8 +30,7 @@ angles have four digits after the point (1.5708), up to 6e-4 with two (1.57); no
 GROUPED = 1e-5
 """Coefficients below this share of the largest of their grouping come from rounded angles: nothing is grouped by them."""
 
-ROUNDING = 1e-13
-"""Sums below this share of their terms are zero but for rounding."""
+ROUNDING = 1e-13  # Sums below this share of their terms are zero but for rounding
 
 SPEED, ACCELERATION = 5.0, 25.0
 """Largest rates of the random states [rad/s, rad/s^2]: as heavy as gravity, so that no kind of column drowns."""

@@ -51,15 +51,13 @@ def exist(parameters: Sequence[Parameter], values: Array) -> bool:
     return not len(own) or bool((np.linalg.eigvalsh(S) > least[:, None]).all())
 
 
-FLAT = 1e-6
-"""Share of the largest eigenvalue below which the least says that a body is flat."""
+FLAT = 1e-6  # Share of the largest eigenvalue below which the least says that a body is flat
 
 SMALL = 0.01
 """Share of the robot's mean mass below which a given body says nothing of the real one, and one of that share of the mean body
 takes its place: a file may have a flange of a milligram where a tool of a kilogram is."""
 
-LEAST = 1e-8
-"""Share of the trace of a link's pseudo-inertia that its least eigenvalue is raised to."""
+LEAST = 1e-8  # Share of the trace of a link's pseudo-inertia that its least eigenvalue is raised to
 
 
 class Divergence(NamedTuple):
@@ -158,11 +156,9 @@ class Bodies:
         return Divergence(value, gradient, root)
 
 
-FASTER = 10.0
-"""What the weight is divided by from stage to stage: each begins near its end."""
+FASTER = 10.0  # What the weight is divided by from stage to stage: each begins near its end
 
-STEPS = 100
-"""Newton steps of a stage at most; some five are usual."""
+STEPS = 100  # Newton steps of a stage at most; some five are usual
 
 CENTRED, CLOSE = 0.1, 1e-8
 """Newton decrement, over the weight, at which a stage and the last one are done: d is self-concordant."""
@@ -170,11 +166,9 @@ CENTRED, CLOSE = 0.1, 1e-8
 SHARE = 0.9
 """Share of the way to the border of what bodies can have that a step goes at most: far too thin ones are slow to grow again."""
 
-LEAST_STEP = 1e-10
-"""Share of a step below which nothing is gained but rounding."""
+LEAST_STEP = 1e-10  # Share of a step below which nothing is gained but rounding
 
-ROUNDING = 1e-13
-"""Share of the objective by which it may rise: rounding."""
+ROUNDING = 1e-13  # Share of the objective by which it may rise: rounding
 
 
 def nearest(A: Array, b: Array, bodies: Bodies, weight: float) -> Array:

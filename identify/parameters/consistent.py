@@ -17,8 +17,7 @@ from idbench.identify.parameters.bodies import Bodies, nearest
 NEAR = 1e-6
 """What a step to twice the given model costs, beside one sigma of the estimate: nothing, where the estimate knows anything."""
 
-CONFIDENCE = 0.999
-"""A model within the ellipsoid that holds the truth with this probability agrees with the estimate."""
+CONFIDENCE = 0.999  # A model within the ellipsoid that holds the truth with this probability agrees with the estimate
 
 LARGER = 30.0
 """Times the size of the given bodies from which on an estimate says that these stand for bodies of an unknown size."""

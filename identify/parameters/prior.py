@@ -12,17 +12,14 @@ from idbench.identify.basis.block import BODY, Parameter
 from idbench.identify.parameters.bodies import Bodies, nearest
 from idbench.identify.rows.factors import AbstractPrior, triangular
 
-ROUNDS, CLOSE = 60, 0.01
-"""Iterations of the evidence at most, and the relative change of a size at which they end."""
+ROUNDS, CLOSE = 60, 0.01  # Iterations of the evidence at most, and the relative change of a size at which they end
 
-LEAST = 1e-3
-"""Least size, over the one that the evidence begins with: no log shows a thousandth of a torque."""
+LEAST = 1e-3  # Least size, over the one that the evidence begins with: no log shows a thousandth of a torque
 
 DECIDED = 0.1
 """Parameters of a group that the rows decide at least: the size of a group of which they decide nothing falls slowly."""
 
-PLAIN = 1e-12
-"""Share of the largest variance that every combination is taken to have at least: more than that is rounding."""
+PLAIN = 1e-12  # Share of the largest variance that every combination is taken to have at least: more than that is rounding
 
 
 @final

@@ -128,8 +128,7 @@ class Chain:
         return self.trim
 
 
-SCHOOL = 0.1
-"""Speed [rad/s] up to which the paper's school leaves the SCARA's instants out."""
+SCHOOL = 0.1  # Speed [rad/s] up to which the paper's school leaves the SCARA's instants out
 
 
 def paper_chain() -> Chain:

@@ -100,8 +100,7 @@ class Window(Protocol):
         """Return the sums of `x`, shape (..., time), shape (..., count)."""
 
 
-OVERLAP = 4
-"""Least length of a stretch, over what is looked at beside it."""
+OVERLAP = 4  # Least length of a stretch, over what is looked at beside it
 
 
 @dataclass(frozen=True, eq=False)

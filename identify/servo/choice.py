@@ -14,11 +14,9 @@ from idbench.identify.servo.parameters import SERVO_FRICTIONS, SIMPLER, paramete
 from idbench.identify.servo.run import ServoRun
 from idbench.identify.servo.stages import Stages
 
-MIN_SHARE = 0.01
-"""Share of the samples from which on what a joint is doing is judged."""
+MIN_SHARE = 0.01  # Share of the samples from which on what a joint is doing is judged
 
-SLOW = 0.05
-"""Speed below which a joint rests, as a share of the speed that it exceeds in 1 % of the samples."""
+SLOW = 0.05  # Speed below which a joint rests, as a share of the speed that it exceeds in 1 % of the samples
 
 
 @final
@@ -59,11 +57,9 @@ def _spread(x: Array, length: int) -> Array:
     return np.concatenate([x, np.full(length - len(x), x[-1])])
 
 
-LEVEL = 0.05
-"""p value, of all comparisons together, below which a law is better."""
+LEVEL = 0.05  # p value, of all comparisons together, below which a law is better
 
-PER_PARAMETER = 2
-"""Parts of the log per parameter of the largest law, each predicted without it."""
+PER_PARAMETER = 2  # Parts of the log per parameter of the largest law, each predicted without it
 
 
 @final

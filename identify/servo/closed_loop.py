@@ -14,14 +14,12 @@ from idbench.identify.servo.run import ServoRun
 if TYPE_CHECKING:
     from idbench.identify.servo.servo_step import ServoLaw
 
-IN_COUNTS = 0.1
-"""How far from a whole count a position may be written, as a share of it, and still be one."""
+IN_COUNTS = 0.1  # How far from a whole count a position may be written, as a share of it, and still be one
 
 SLOPE = 5.0
 """Sampling times that one count of error in a slope through seven samples takes to be a count: sqrt(sum (k - 3)^2) = 5.3."""
 
-STATES = 3
-"""Of the beginning of a run: position, speed, target."""
+STATES = 3  # Of the beginning of a run: position, speed, target
 
 
 @final
@@ -35,8 +33,7 @@ class Begin(NamedTuple):
     as the joint is away from its command, since nobody knows where it was before the log."""
 
 
-WAY = 6
-"""Ranges of its motion that a joint may cross in a step: beyond, it is lost, and numbers would overflow."""
+WAY = 6  # Ranges of its motion that a joint may cross in a step: beyond, it is lost, and numbers would overflow
 
 
 @final

@@ -18,12 +18,10 @@ from idbench.identify.servo.parameters import SERVO_PARAMETERS
 from idbench.identify.servo.run import ServoRun
 from idbench.identify.servo.search import Found
 
-CLUSTERS = 2
-"""Clusters per parameter: where there are fewer runs, or pieces of them, these are cut into stretches of time."""
+CLUSTERS = 2  # Clusters per parameter: where there are fewer runs, or pieces of them, these are cut into stretches of time
 
 
-MIN_PARTS = 24
-"""Parts of a log by which scales are compared, at least, whatever the number of parameters."""
+MIN_PARTS = 24  # Parts of a log by which scales are compared, at least, whatever the number of parameters
 
 
 @final
@@ -169,25 +167,20 @@ class ServoFit:
         return np.arange(len(apart)) >= (last if last <= len(apart) // 2 else 0)
 
 
-TORQUES = ("a", "b", "Ia", "Fs", "Fv", "Fst", "Fo")
-"""Parameters that scale together where no known load sets the scale."""
+TORQUES = ("a", "b", "Ia", "Fs", "Fv", "Fst", "Fo")  # Parameters that scale together where no known load sets the scale
 
-OTHER_SCALE = 1.5
-"""Factor on the torque per volt."""
+OTHER_SCALE = 1.5  # Factor on the torque per volt
 
 MIN_RISE = 16.0
 """By how much another scale must make the objective larger, in means over the parts of the log: four standard errors, if a
 part counts as one observation. Simulated joints whose scale was wrong had 0 to 14, those with a mass that sets it 26 and more;
 the public bench had 5 to 31 from single runs, 23 from a hundred."""
 
-SIGMAS = 2.0
-"""Standard errors that a range of the common factor has."""
+SIGMAS = 2.0  # Standard errors that a range of the common factor has
 
-LEAST_RISE = 0.01
-"""Rise below which nothing is known of the factor: it is then stated as 1/60 to 60."""
+LEAST_RISE = 0.01  # Rise below which nothing is known of the factor: it is then stated as 1/60 to 60
 
-UNEXPLAINED = 0.2
-"""Typical residual, as a share of the range of the motion, from which on a fit explains nothing."""
+UNEXPLAINED = 0.2  # Typical residual, as a share of the range of the motion, from which on a fit explains nothing
 
 
 def require_possible(held: Mapping[str, float]) -> None:

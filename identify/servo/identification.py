@@ -14,8 +14,7 @@ from idbench.identify.servo.run import ServoRun
 from idbench.identify.servo.stages import Stages
 from idbench.identify.telling import one_thread
 
-APART = 0.01
-"""By how much an offset is changed to see what that does to other joints [rad]."""
+APART = 0.01  # By how much an offset is changed to see what that does to other joints [rad]
 
 INSEPARABLE = 100.0
 """Condition number from which on offsets cannot be told apart: what gravity says of one, another can make up for."""

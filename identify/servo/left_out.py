@@ -9,15 +9,13 @@ from idbench.identify.arrays import Array
 from idbench.identify.servo.closed_loop import ServoLoop
 from idbench.identify.servo.search import Found
 
-UNCORRELATED = 0.05
-"""Correlation of residuals below which stretches of time are taken as independent."""
+UNCORRELATED = 0.05  # Correlation of residuals below which stretches of time are taken as independent
 
 MIN_CLUSTERS = 8
 """Clusters by which a covariance is found at least: of one there is none, of few it is by chance. Where residuals are
 correlated over longer times, as an offset is over all of a log, standard errors are then too small."""
 
-MOST_LEVERAGE = 0.99
-"""Of a cluster on its own fit: beyond, nothing is left of its residuals to say how they scatter."""
+MOST_LEVERAGE = 0.99  # Of a cluster on its own fit: beyond, nothing is left of its residuals to say how they scatter
 
 
 @final

@@ -25,8 +25,7 @@ MISTAKES: Mapping[str, str] = {
 }
 """Parameters of which each is a mistake that people make, or a part of a loop that they do not know of, and its cause."""
 
-EXPLAINED = 3.0
-"""Residual over what rounding leaves, up to which there is nothing to explain: clocks of cheap servos jitter."""
+EXPLAINED = 3.0  # Residual over what rounding leaves, up to which there is nothing to explain: clocks of cheap servos jitter
 
 GAINED = 0.6
 """Share of the error of parts left out that a mistake must explain. Gains, zeros and scales that were set wrongly explained 0.9
@@ -35,17 +34,13 @@ to 0.99 on simulated benches; what is no mistake of the table, such as low-passe
 REMAINING = 0.01
 """Residual, as a share of the range of the motion, that may be left with a mistake: beyond, something else is wrong."""
 
-GLANCES = 5
-"""Rounds of a search that tells which mistakes are likely."""
+GLANCES = 5  # Rounds of a search that tells which mistakes are likely
 
-LIKELY = 3
-"""Mistakes that are searched for further."""
+LIKELY = 3  # Mistakes that are searched for further
 
-ROUNDS = 25
-"""Rounds of these: of a gain that is half of what it is, the first five led elsewhere."""
+ROUNDS = 25  # Rounds of these: of a gain that is half of what it is, the first five led elsewhere
 
-AS_WELL = 0.8
-"""Share of what the best mistake explains from which on another one is named beside it."""
+AS_WELL = 0.8  # Share of what the best mistake explains from which on another one is named beside it
 
 
 @final

@@ -68,8 +68,7 @@ class ServoParameter(NamedTuple):
 
 NEGATIVE = float("-inf")
 
-LATEST = 1.0
-"""Longest delay of a command [s]: what comes later is no response to it."""
+LATEST = 1.0  # Longest delay of a command [s]: what comes later is no response to it
 
 SERVO_PARAMETERS: dict[str, ServoParameter] = {
     "a": ServoParameter("N m/V", "torque per volt, kt/R; of a loop that commands torque or current, per N m or A", 0.03),

@@ -10,8 +10,7 @@ from scipy.signal import butter, sosfiltfilt
 from idbench.identify.arrays import Array
 from idbench.identify.servo.run import ServoRun
 
-CUTOFF = 1 / 12
-"""Cut-off of the low-pass, as a share of the sampling frequency: motion lies below, differentiated counts above."""
+CUTOFF = 1 / 12  # Cut-off of the low-pass, as a share of the sampling frequency: motion lies below, differentiated counts above
 
 DRIFT_CUTOFF = CUTOFF / 2
 """Cut-off of the residuals that correct a simulated motion, as a share of the sampling frequency.
@@ -58,13 +57,11 @@ def corrected(fine: Array, simulated: Array, t: Array, measured: Array) -> tuple
 DELAYS = np.array([*np.arange(0.0, 0.0601, 0.005), 0.08, 0.1, 0.13, 0.16, 0.2, 0.25])
 """Delays of the command that are tried [s]."""
 
-RATES = 10
-"""Rate limits that are tried, between half and 1.3 times the largest speed of a joint, beside none."""
+RATES = 10  # Rate limits that are tried, between half and 1.3 times the largest speed of a joint, beside none
 
 DECIMATION = max(1, int(0.25 / CUTOFF))  # rows at twice the rate that the band of the smoothing needs
 
-LIGHTEST = 1e-6
-"""Inertia of a rotor of which rows show none, per torque: a search in shares of it could not leave zero."""
+LIGHTEST = 1e-6  # Inertia of a rotor of which rows show none, per torque: a search in shares of it could not leave zero
 
 COLUMNS = ("a", "b", "Ia", "Fs", "offset")
 

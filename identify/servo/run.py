@@ -13,16 +13,14 @@ from idbench.identify.data.jumps import encoder_steps
 from idbench.identify.errors import LogError, SettingError, require_positive
 from idbench.identify.servo.law import Servo
 
-PARTS = ("inertia", "sine", "cosine", "rest", "lightness", "shaking")
-"""Of a load."""
+PARTS = ("inertia", "sine", "cosine", "rest", "lightness", "shaking")  # Of a load
 
 
 def _none() -> Array:
     return frozen(np.zeros(()))
 
 
-G = 9.81
-"""Gravity of a pendulum on a bench [m/s^2]."""
+G = 9.81  # Gravity of a pendulum on a bench [m/s^2]
 
 
 @final
@@ -87,14 +85,11 @@ class JointLoad:
         return np.asarray(sine * np.sin(q) + cosine * np.cos(q) + rest)
 
 
-MIN_SAMPLES = 20
-"""Samples that a run must have."""
+MIN_SAMPLES = 20  # Samples that a run must have
 
-SPIKE = 5.0
-"""Times the longest way of the joint in a sample: a position that is further from those about it was not read well."""
+SPIKE = 5.0  # Times the longest way of the joint in a sample: a position that is further from those about it was not read well
 
-BESIDE = 5
-"""Samples whose median a position is compared with."""
+BESIDE = 5  # Samples whose median a position is compared with
 
 
 def well_read(q: Array) -> npt.NDArray[np.bool_]:
@@ -203,20 +198,17 @@ class ServoRun:
         return without_spikes(self.t, self.q)
 
 
-REST = 0.1
-"""How long joint and command have stood still where a run is cut [s], beside the delay of the command."""
+REST = 0.1  # How long joint and command have stood still where a run is cut [s], beside the delay of the command
 
 AFTER = 0.05
 """How long they go on to do so [s]: a piece that begins with a motion needs its speed, and the instant when it began."""
 
-SHORTEST = 0.8
-"""Least length of a piece [s]."""
+SHORTEST = 0.8  # Least length of a piece [s]
 
 STILL = 1e-3
 """Share of the range of a motion that stands for a count where positions are not rounded: 1000 in a range, as of 10 bits."""
 
-MOVES = 4
-"""Counts by which a joint moves in a piece that says anything."""
+MOVES = 4  # Counts by which a joint moves in a piece that says anything
 
 
 def pieces(run: ServoRun, delay: float) -> list[ServoRun]:

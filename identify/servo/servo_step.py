@@ -9,8 +9,7 @@ import numpy.typing as npt
 from idbench.identify.arrays import Array
 from idbench.identify.compiled import compiled
 
-LIGHT = 1e-9
-"""Inertia of a link that has none, beside that of its rotor."""
+LIGHT = 1e-9  # Inertia of a link that has none, beside that of its rotor
 
 
 class ServoLaw(NamedTuple):

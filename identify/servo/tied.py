@@ -11,8 +11,7 @@ from idbench.identify.servo.left_out import left_out
 from idbench.identify.servo.search import ServoSearch
 from idbench.identify.servo.stages import Stages
 
-OF_JOINT = ("offset", "bias", "zero", "scale_error", "Mg")
-"""Parameters of a joint; all others are those of its motor."""
+OF_JOINT = ("offset", "bias", "zero", "scale_error", "Mg")  # Parameters of a joint; all others are those of its motor
 
 
 def tied(fits: Mapping[int, ServoFit]) -> dict[int, ServoFit]:

@@ -13,8 +13,7 @@ from idbench.identify.arrays import Array, frozen
 from idbench.identify.errors import LogError, SettingError, require_positive
 from idbench.identify.plugins import Table
 
-SETTLED = 0.01
-"""A recursive filter remembers for ever; it counts as settled when its slowest mode has decayed to this share."""
+SETTLED = 0.01  # A recursive filter remembers for ever; it counts as settled when its slowest mode has decayed to this share
 
 
 def settling_time(sections: Array, fs: float) -> float:
@@ -47,8 +46,7 @@ def _steady_state(sections: bytes) -> Array:
     return frozen(scipy.signal.sosfilt_zi(np.frombuffer(sections).reshape(-1, 6)))
 
 
-REACH = 4
-"""Samples to either side from which a value between two samples is interpolated: a polynomial of degree 7."""
+REACH = 4  # Samples to either side from which a value between two samples is interpolated: a polynomial of degree 7
 
 
 def slide(x: Array, weights: Array, spacing: int = 1) -> Array:

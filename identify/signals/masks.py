@@ -47,8 +47,7 @@ class NoMask(AbstractMask):
         return np.ones_like(qd)
 
 
-MIN_SPEED = 1e-12
-"""Speed below which there is none."""
+MIN_SPEED = 1e-12  # Speed below which there is none
 
 WIDE = (1.0, 10 / 3)
 """Width and taper of a wide mask, in tapers of a short one: 30 and 100 ms of 30 ms. Differences look 30 ms across a kink; edges

@@ -15,17 +15,13 @@ from idbench.identify.errors import require_below_nyquist, require_positive, req
 from idbench.identify.plugins import Table
 from idbench.identify.signals.filters import forward_backward, settling_time, slide
 
-SLOW = 0.05
-"""Share of a joint's rms speed up to which it counts as turning: 0.1 rad/s of the SCARA's 2 rad/s."""
+SLOW = 0.05  # Share of a joint's rms speed up to which it counts as turning: 0.1 rad/s of the SCARA's 2 rad/s
 
-NOISY = 4.0
-"""Standard deviations of the noise of velocities up to which their sign is not known."""
+NOISY = 4.0  # Standard deviations of the noise of velocities up to which their sign is not known
 
-THIRD = 3
-"""Order of the differences of velocities in which motion vanishes beside noise."""
+THIRD = 3  # Order of the differences of velocities in which motion vanishes beside noise
 
-QUIET = 0.8
-"""Quantile of the absolute third differences of velocities that measures their noise: most of any motion is smooth."""
+QUIET = 0.8  # Quantile of the absolute third differences of velocities that measures their noise: most of any motion is smooth
 
 
 def velocity_noise(qd: Array) -> Array:

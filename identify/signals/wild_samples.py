@@ -6,20 +6,16 @@ import scipy
 
 from idbench.identify.arrays import Array
 
-WILD = 6.0
-"""Standard deviations, from a quantile of the absolute differences, beyond which a sample is wild."""
+WILD = 6.0  # Standard deviations, from a quantile of the absolute differences, beyond which a sample is wild
 
-REACH = 2
-"""Samples to either side from which the one between them is interpolated, by a cubic."""
+REACH = 2  # Samples to either side from which the one between them is interpolated, by a cubic
 
-PASSES = 50
-"""Times at most that wild samples are sought: neighbours of one look wild until it is replaced."""
+PASSES = 50  # Times at most that wild samples are sought: neighbours of one look wild until it is replaced
 
 SHARE, SIGMA = 0.8, 1 / 1.2816
 """Quantile of the absolute differences from which their standard deviation follows, and its ratio to that."""
 
-CUBIC = np.array([-1.0, 4.0, 0.0, 4.0, -1.0]) / 6.0
-"""Weights with which neighbours say a sample."""
+CUBIC = np.array([-1.0, 4.0, 0.0, 4.0, -1.0]) / 6.0  # Weights with which neighbours say a sample
 
 
 def without_wild_samples(x: Array, least: float) -> tuple[Array, npt.NDArray[np.bool_]]:

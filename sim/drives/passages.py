@@ -10,8 +10,7 @@ from idbench.sim.drives.pwm import Modulator, Pieces, pieces
 from idbench.sim.drives.winding import Winding, pass_period, straight
 from idbench.sim.robot.motors import Array
 
-MAX_VALUES = 20_000
-"""Values of the modulation index beyond which no table is made."""
+MAX_VALUES = 20_000  # Values of the modulation index beyond which no table is made
 
 
 @dataclass(frozen=True, eq=False)

@@ -30,8 +30,7 @@ from idbench.sim.trajectories import Reference
 
 T = TypeVar("T")
 
-NOISE = 2
-"""Stream of random numbers of the torque's noise."""
+NOISE = 2  # Stream of random numbers of the torque's noise
 
 BLOCK = 1e-3
 """Time [s] over which the motion of the rotors may be predicted, for back-EMF and ripple: with a jerk of 1000 rad/s^3 they are

@@ -10,8 +10,7 @@ from idbench.sim.engine.run import Run
 from idbench.sim.robot.inverse_dynamics import InverseDynamics
 from idbench.sim.robot.motors import Array
 
-NOTHING = 1e-6
-"""Share of the logged torque below which what drives add is rounding."""
+NOTHING = 1e-6  # Share of the logged torque below which what drives add is rounding
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,8 +15,7 @@ from idbench.sim.robot.motors import Array
 from idbench.sim.robot.robot import Robot
 from idbench.sim.settings import EachNotNegative, EachNumber, Number, Positive, per_joint, settings
 
-ANGLES = 9
-"""Positions within a turn at which a law may jump."""
+ANGLES = 9  # Positions within a turn at which a law may jump
 
 SLOW, JUMP = 1e-9, 1e-6
 """Speed at which a joint is as good as at rest [rad/s], and change of a unit law over twice that which is a jump."""

@@ -21,17 +21,13 @@ Point = tuple[Number, Number, Number]
 RATES = ("velocity", "acceleration", "jerk")
 """Limits that MJCF has no word for: a robot's file gives them as `<custom><numeric name="max_velocity" data="..."/>`."""
 
-DEGREES = 5.0
-"""Times the range of a file beyond which one that is asked for is taken for degrees."""
+DEGREES = 5.0  # Times the range of a file beyond which one that is asked for is taken for degrees
 
-FLOOR = "the floor"
-"""What the floor is called beside the shapes of a file."""
+FLOOR = "the floor"  # What the floor is called beside the shapes of a file
 
-CLEARANCE = 0.01
-"""Least distance between shapes by default [m]; pairs that never get so far apart are made so."""
+CLEARANCE = 0.01  # Least distance between shapes by default [m]; pairs that never get so far apart are made so
 
-BOX = "keep_out {}"
-"""What a box is called beside them."""
+BOX = "keep_out {}"  # What a box is called beside them
 
 
 @final

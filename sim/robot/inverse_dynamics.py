@@ -11,8 +11,7 @@ from idbench.sim.robot.motors import Array
 from idbench.sim.robot.robot import Robot
 from idbench.sim.robot.varied import vary_fields
 
-BLOCK = 8192
-"""States evaluated together: bounds the memory of long trajectories."""
+BLOCK = 8192  # States evaluated together: bounds the memory of long trajectories
 
 
 class InverseDynamics:

@@ -81,11 +81,9 @@ def with_values(values: Mapping[str, float | None]) -> Callable[[mujoco.MjSpec],
     return edit
 
 
-MIN_FACTOR, MAX_FACTOR = 1e-6, 1e6
-"""Sizes of a coupling's factors beyond which they are slips."""
+MIN_FACTOR, MAX_FACTOR = 1e-6, 1e6  # Sizes of a coupling's factors beyond which they are slips
 
-PLAIN = Mounting()
-"""As the file describes it."""
+PLAIN = Mounting()  # As the file describes it
 
 
 def _couple(spec: mujoco.MjSpec, name: str, weights: Sequence[tuple[str, float]]) -> None:
@@ -226,5 +224,4 @@ def coupled(texts: Sequence[str]) -> tuple[tuple[str, tuple[tuple[str, float], .
     return tuple(found)
 
 
-TERM = re.compile(r"([+-]?)((?:\d*\.)?\d+(?:[eE][+-]?\d+)?\*|)([A-Za-z_][\w./:]*)")
-"""A joint with a sign and a factor."""
+TERM = re.compile(r"([+-]?)((?:\d*\.)?\d+(?:[eE][+-]?\d+)?\*|)([A-Za-z_][\w./:]*)")  # A joint with a sign and a factor

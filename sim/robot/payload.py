@@ -38,11 +38,9 @@ def without_missing_meshes(spec: mujoco.MjSpec, folder: Path) -> list[str]:
     return notes + ([f"no inertia of {', '.join(bare)} but that of its mesh: 1 g is taken"] if bare else [])
 
 
-HARD = (0.95, 0.999, 1e-4, 0.5, 2.0)
-"""MuJoCo's solimp of the ends: hard from 0.1 mrad on."""
+HARD = (0.95, 0.999, 1e-4, 0.5, 2.0)  # MuJoCo's solimp of the ends: hard from 0.1 mrad on
 
-LOCKED = 1e-9
-"""Play of a joint that has none [rad]."""
+LOCKED = 1e-9  # Play of a joint that has none [rad]
 
 
 def with_play(spec: mujoco.MjSpec, play: Array, h: float) -> None:

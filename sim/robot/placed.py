@@ -11,8 +11,7 @@ from idbench.identify.data.kinematics import INERTIAL, Joint, KinematicTree
 from idbench.sim.robot.motors import Array
 from idbench.sim.robot.robot import Robot
 
-BASE = "base"
-"""Name of the link that stands."""
+BASE = "base"  # Name of the link that stands
 
 
 @final

@@ -13,8 +13,7 @@ from idbench.sim.robot.robot import Robot
 LOW_PASSES = (int(mujoco.mjtDyn.mjDYN_FILTER), int(mujoco.mjtDyn.mjDYN_FILTEREXACT))
 """Dynamics of actuators that are low-passes of their control."""
 
-PLACES = {"R": 0, "K": 1, "kp": 4, "ki": 5, "kd": 6, "V": 7}
-"""Places of the parameters of a `dcmotor` among those of its gain."""
+PLACES = {"R": 0, "K": 1, "kp": 4, "ki": 5, "kd": 6, "V": 7}  # Places of the parameters of a `dcmotor` among those of its gain
 
 
 @final

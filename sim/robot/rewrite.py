@@ -21,8 +21,7 @@ from idbench.sim.robot.payload import without_missing_meshes
 from idbench.sim.robot.robot import Robot
 from idbench.sim.robot.tree import kinematic_tree, standard_parameters
 
-ROUNDING = 1e-9
-"""Share of the largest parameter by which those of the compiled file may differ from what was written into it."""
+ROUNDING = 1e-9  # Share of the largest parameter by which those of the compiled file may differ from what was written into it
 
 Values = Mapping[str, float]
 

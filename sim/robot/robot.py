@@ -28,8 +28,7 @@ _log = mujoco.MjLogConfig.get()
 _log.logto_console = _log.logto_file = False  # what it warns of is checked and reported by the bench
 _log.set()
 
-FILES = (".xml", ".urdf", TABLE)
-"""What names of files end with."""
+FILES = (".xml", ".urdf", TABLE)  # What names of files end with
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,8 +23,7 @@ _KINDS: dict[int, Kind] = {
     int(mujoco.mjtGeom.mjGEOM_MESH): "mesh",
 }
 
-HIDDEN = 3
-"""Geoms of this group and higher are not drawn, as in MuJoCo's own viewer: they are there for collisions."""
+HIDDEN = 3  # Geoms of this group and higher are not drawn, as in MuJoCo's own viewer: they are there for collisions
 
 
 @dataclass(frozen=True, eq=False)

@@ -28,11 +28,9 @@ EARLY = 1.3
 NO_DRIVE = ("armature", "damping", "frictionloss", "stiffness", "margin", "ref", "springref")
 """What a joint that is free play has none of, whatever the defaults of the file are."""
 
-GROUPS = 31
-"""Groups of actuators that MuJoCo can disable."""
+GROUPS = 31  # Groups of actuators that MuJoCo can disable
 
-PLAY = "_play"
-"""What the name of a joint's free play ends with."""
+PLAY = "_play"  # What the name of a joint's free play ends with
 
 SHARP_FRICTION = (1e-4, 1.0), (0.9999, 0.9999, 0.001, 0.5, 2.0)
 """MuJoCo's solref and solimp of dry friction that is as sharp as any step allows: its own lets a joint creep under its load."""

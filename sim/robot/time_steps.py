@@ -9,8 +9,7 @@ from idbench.sim.robot.inverse_dynamics import inverse_dynamics
 from idbench.sim.robot.motors import Array
 from idbench.sim.robot.robot import Robot
 
-VELOCITY = 2
-"""Place of what multiplies the velocity among the numbers of an actuator's bias: -kv of `position`."""
+VELOCITY = 2  # Place of what multiplies the velocity among the numbers of an actuator's bias: -kv of `position`
 
 
 def apparent_rotor_inertia(robot: Robot) -> Array:

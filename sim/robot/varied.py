@@ -18,8 +18,7 @@ from idbench.sim.robot.tree import TENDON, fixed_tendons, tendon_name
 DRIVE = {"Ia": "dof_armature", "Fv": "dof_damping", "Fs": "dof_frictionloss", "K": "jnt_stiffness"}
 """Letters of the parameters of a drive, and MuJoCo's fields of them."""
 
-RESISTING = ("dof_frictionloss", "tendon_frictionloss")
-"""Fields in which MuJoCo takes what is below zero for zero."""
+RESISTING = ("dof_frictionloss", "tendon_frictionloss")  # Fields in which MuJoCo takes what is below zero for zero
 
 
 def model_fields(robot: Robot, standard: Mapping[str, Array]) -> dict[str, Array]:

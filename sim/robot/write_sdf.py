@@ -11,8 +11,7 @@ from idbench.sim.robot.robot import Robot
 from idbench.sim.robot.urdf import GEAR_RATIO, ROTOR_INERTIA, SIZE, SMALL
 from idbench.sim.robot.write_urdf import DRAKE
 
-VERSION = "1.9"
-"""Of the format."""
+VERSION = "1.9"  # Of the format
 
 
 def sdf_text(robot: Robot, tree: KinematicTree, standard: Mapping[str, float]) -> str:

@@ -10,11 +10,9 @@ from idbench.sim.robot.placed import BASE, Body, PlacedLink, numbers, placed_lin
 from idbench.sim.robot.robot import Robot
 from idbench.sim.robot.urdf import GEAR_RATIO, ROTOR_INERTIA, parsed
 
-UNLIMITED = 1e6
-"""What stands for no limit, where a URDF must have one."""
+UNLIMITED = 1e6  # What stands for no limit, where a URDF must have one
 
-DRAKE = "http://drake.mit.edu"
-"""Namespace of the elements that Drake reads."""
+DRAKE = "http://drake.mit.edu"  # Namespace of the elements that Drake reads
 
 
 def urdf_text(name: str, robot: Robot, tree: KinematicTree, standard: Mapping[str, float], mounting: Mounting) -> str:

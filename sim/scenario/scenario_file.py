@@ -18,11 +18,9 @@ from idbench.sim.scenario.scenario import Scenario
 from idbench.sim.settings import description, for_all_joints, limits, make
 from idbench.sim.trajectories import TRAJECTORIES
 
-LONGEST = 1500
-"""Letters from which on a table comes after the others."""
+LONGEST = 1500  # Letters from which on a table comes after the others
 
-LONG = 60
-"""Characters beyond which a value stands on lines of its own."""
+LONG = 60  # Characters beyond which a value stands on lines of its own
 
 FOLDER = Path(__file__).parent / "scenarios"
 

@@ -13,8 +13,7 @@ from idbench.sim.settings import NotNegative, Number, Positions, Positive, Whole
 from idbench.sim.trajectories.point_to_point import at_rest
 from idbench.sim.trajectories.trajectory import AbstractMotion, AbstractTrajectory, Reference
 
-STILL = 1e-6
-"""Speed, and acceleration, at the ends of a period, as a share of the largest, that counts as rest."""
+STILL = 1e-6  # Speed, and acceleration, at the ends of a period, as a share of the largest, that counts as rest
 
 
 @dataclass(frozen=True, eq=False)

@@ -44,12 +44,10 @@ class Quintic(AbstractTrajectory):
         return self.points
 
 
-DRAWS = 10000
-"""Draws of all joints, and then of single ones, after which no waypoint is believed to exist."""
+DRAWS = 10000  # Draws of all joints, and then of single ones, after which no waypoint is believed to exist
 
 
-BLOCK = 50
-"""Draws that are looked at together."""
+BLOCK = 50  # Draws that are looked at together
 
 
 def _far(points: Array, neighbours: Array, smallest_move: Array | float) -> npt.NDArray[np.bool_]:

@@ -121,17 +121,13 @@ def _standing(point: Array) -> Array:
     return states
 
 
-VELOCITY = 1.0
-"""Largest speed of a gentle move [rad/s]."""
+VELOCITY = 1.0  # Largest speed of a gentle move [rad/s]
 
-ACCELERATION = 5.0
-"""Largest acceleration of a gentle move [rad/s^2]."""
+ACCELERATION = 5.0  # Largest acceleration of a gentle move [rad/s^2]
 
-JERK = 50.0
-"""Largest jerk of a gentle move [rad/s^3]."""
+JERK = 50.0  # Largest jerk of a gentle move [rad/s^3]
 
-REST = 0.2
-"""Time at rest before and after it [s]."""
+REST = 0.2  # Time at rest before and after it [s]
 
 
 def approach(robot: Robot, start: Array, goal: Array, fs: float, most: Array | None = None) -> Reference:

@@ -45,11 +45,9 @@ class AbstractMotion(ABC):
         return self.at(np.arange(count) / fs, fs)
 
 
-MOST_SAMPLES = 1e8
-"""Samples of a joint above which a motion is taken for a slip: 0.8 GB."""
+MOST_SAMPLES = 1e8  # Samples of a joint above which a motion is taken for a slip: 0.8 GB
 
-LONGEST = 1e6
-"""Duration [s] above which a motion is taken for a slip: eleven days."""
+LONGEST = 1e6  # Duration [s] above which a motion is taken for a slip: eleven days
 
 
 class AbstractTrajectory(ABC):

@@ -31,8 +31,7 @@ from idbench.experiments.text import new_table, print_titled
 from idbench.identify.loads.payload import PayloadEstimate
 from idbench.sim.robot.rewrite import with_body
 
-NOT_MADE_AGAIN = ("force", "json", "write_mjcf")
-"""Options that a report does not name where it says how to make it again."""
+NOT_MADE_AGAIN = ("force", "json", "write_mjcf")  # Options that a report does not name where it says how to make it again
 
 
 def payload(options: IdentifyPayload) -> None:

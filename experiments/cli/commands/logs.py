@@ -27,8 +27,7 @@ from idbench.identify.files.log_file import CSV, WRITTEN, read_log, write_log
 from idbench.identify.files.reading import LAYOUT_FILE, layout_of, read_columns
 from idbench.identify.files.table import needs_gain
 
-ROUNDED = 1e-4
-"""Departure of a step's logarithm from a whole number up to which it is a file's decimal places, no encoder's."""
+ROUNDED = 1e-4  # Departure of a step's logarithm from a whole number up to which it is a file's decimal places, no encoder's
 
 
 def show_log(options: ShowLog) -> None:

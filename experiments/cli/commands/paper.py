@@ -23,8 +23,7 @@ from idbench.experiments.results.writing import require_free, write_text
 from idbench.identify.files.log_file import write_log
 from idbench.sim.scenario.scenario_file import load, to_toml
 
-LEFT_OUT = ("out", "force", "json", "watching")
-"""Options that make no difference to a table."""
+LEFT_OUT = ("out", "force", "json", "watching")  # Options that make no difference to a table
 
 
 def _folder(options: Table1Command | Table2Command, experiment: str) -> ResultsFolder:

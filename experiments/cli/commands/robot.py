@@ -22,8 +22,7 @@ from idbench.identify.blame import is_mistake
 from idbench.sim.errors import BenchError
 from idbench.sim.trajectories import RandomMoves
 
-MANY = 30
-"""Joints from which on a line says that grouping takes its time: it grows with their cube."""
+MANY = 30  # Joints from which on a line says that grouping takes its time: it grows with their cube
 
 
 def describe(options: DescribeRobot) -> None:

@@ -26,8 +26,7 @@ from idbench.identify.files.log_file import write_log
 from idbench.sim.drives import ServoDrive
 from idbench.sim.scenario.scenario import Scenario
 
-LEFT_OUT = ("out", "force", "json", "watching", "yes", "verbose")
-"""Options that make no difference to a run's results."""
+LEFT_OUT = ("out", "force", "json", "watching", "yes", "verbose")  # Options that make no difference to a run's results
 
 
 def run(options: RunCommand) -> None:

@@ -13,8 +13,7 @@ from idbench.experiments.recording.viewers import LOOPBACK, require_display, vie
 from idbench.experiments.results.page import new_page
 from idbench.experiments.results.writing import new_file
 
-LATEST = Path("runs")
-"""Where the latest results are looked for."""
+LATEST = Path("runs")  # Where the latest results are looked for
 
 
 def view(options: View) -> None:

@@ -2,8 +2,7 @@
 
 from importlib import import_module
 
-FILES = ("jobs", "tools")
-"""Each registers its commands, in the order of the help: first those that people need first."""
+FILES = ("jobs", "tools")  # Each registers its commands, in the order of the help: first those that people need first
 
 for _file in FILES:
     import_module(f"{__name__}.{_file}")

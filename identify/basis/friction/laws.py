@@ -58,8 +58,7 @@ class CoulombFriction(AbstractFriction):
         return np.sign(qd)
 
 
-START, RANGE = 0.2, (0.01, 5.0)
-"""Velocity over which friction rises: where it is looked for first, and within [rad/s]."""
+START, RANGE = 0.2, (0.01, 5.0)  # Velocity over which friction rises: where it is looked for first, and within [rad/s]
 
 
 @final

@@ -13,11 +13,9 @@ from idbench.identify.basis.block import Kind, Parameter
 from idbench.identify.basis.joint_law import AbstractFriction, AbstractJointLaw
 from idbench.identify.signals.signals import State
 
-STEP = 1e-4
-"""Of central differences by the logarithm of a shape."""
+STEP = 1e-4  # Of central differences by the logarithm of a shape
 
-FACTOR = 2.0
-"""By which a shape changes at most from one round to the next: the slope there says little of what is farther away."""
+FACTOR = 2.0  # By which a shape changes at most from one round to the next: the slope there says little of what is farther away
 
 
 class Shape(NamedTuple):

@@ -15,8 +15,7 @@ from idbench.identify.signals.signals import State
 CENTRES = tuple(float(x) for x in np.linspace(-4, 4, 17))
 """Centres of the bumps, in asinh(qd/v): with v a tenth of the rms speed they reach 2.7 times it, in either direction."""
 
-WIDTH = 0.5
-"""Width of a bump, which is their distance."""
+WIDTH = 0.5  # Width of a bump, which is their distance
 
 
 @final

@@ -15,8 +15,7 @@ from idbench.identify.estimators.simulating.row_products import with_weights
 from idbench.identify.estimators.solution import Given
 from idbench.identify.rows.operators.windows import AbstractWeakForm
 
-RIDGE = 1e-9
-"""Initial information about every parameter, as a share of that of all rows; it regularizes the first p selections."""
+RIDGE = 1e-9  # Initial information about every parameter, as a share of that of all rows; it regularizes the first p selections
 
 
 @final

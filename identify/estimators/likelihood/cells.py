@@ -15,8 +15,7 @@ from idbench.identify.signals.filters import shift
 GAUSS = 0.5 - np.sqrt(3) / 6, 0.5 + np.sqrt(3) / 6
 """Where the torque equation is asked for in a cell: their mean has the torque's mean over it, to fourth order."""
 
-HELD = 0.05
-"""Half the difference of two torques in a cell that a drive held, over the noise of their mean: next to none."""
+HELD = 0.05  # Half the difference of two torques in a cell that a drive held, over the noise of their mean: next to none
 
 
 @dataclass(frozen=True, eq=False)

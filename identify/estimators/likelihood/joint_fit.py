@@ -17,8 +17,7 @@ from idbench.identify.noise.linearization import friction_jumps, smoothed
 from idbench.identify.noise.propagation import NoiseLevels
 from idbench.identify.signals.masks import ReversalMask
 
-ROUNDS, STEPS = 12, 12
-"""Rounds at most, in each of which mask and levels are frozen, and Gauss-Newton steps of each."""
+ROUNDS, STEPS = 12, 12  # Rounds at most, in each of which mask and levels are frozen, and Gauss-Newton steps of each
 
 RESTLESS = 3.0
 """Move of the last step, in sigma, above which parameters are refused: with coarse encoders masks may go to and fro, for a
@@ -41,20 +40,15 @@ PROBES, MOST_PROBES = 16_000, 6
 CHECK = "check order and delay of the torques, and whether they were filtered, or use GLS"
 """What helps where torques and motion do not go together."""
 
-UNKNOWN = 5.0
-"""Noise of the torque where friction's sign is not known, over the jump of friction there."""
+UNKNOWN = 5.0  # Noise of the torque where friction's sign is not known, over the jump of friction there
 
-TURNING = 0.3
-"""Half the difference of two torques near a reversal, over the level of their mean there."""
+TURNING = 0.3  # Half the difference of two torques near a reversal, over the level of their mean there
 
-START = 0.1
-"""Level of the torques near reversals to begin with, over the jump of friction there."""
+START = 0.1  # Level of the torques near reversals to begin with, over the jump of friction there
 
-NEAR = 5.0
-"""How far velocities may then be from differences of the positions, over what noise and accelerations make of these."""
+NEAR = 5.0  # How far velocities may then be from differences of the positions, over what noise and accelerations make of these
 
-MASK = ReversalMask(width=0.02, taper=0.02)
-"""Where the sign of a velocity is no model of friction."""
+MASK = ReversalMask(width=0.02, taper=0.02)  # Where the sign of a velocity is no model of friction
 
 
 @dataclass(frozen=True, eq=False)

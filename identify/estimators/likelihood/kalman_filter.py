@@ -25,17 +25,14 @@ ALPHA, BETA = 0.1, 2.0
 """Spread of the sigma points, and 2 for normal distributions (E. A. Wan and R. van der Merwe, "The unscented Kalman filter for
 nonlinear estimation", Proc. IEEE AS-SPCC 2000, 153-158)."""
 
-TUNINGS = 1.0, 3.0, 10.0
-"""Process noise that is tried, over the torque noise of the log."""
+TUNINGS = 1.0, 3.0, 10.0  # Process noise that is tried, over the torque noise of the log
 
-MIN_NOISE = 1e-7
-"""Noise of positions [rad] and torques [N m] at least: of exact ones covariances would be those of rounding."""
+MIN_NOISE = 1e-7  # Noise of positions [rad] and torques [N m] at least: of exact ones covariances would be those of rounding
 
 UNSURE = 10.0
 """Uncertainty of a parameter at the beginning at least, in steps that make 0.1 % of the torque: those that begin at zero."""
 
-FASTEST = 100.0
-"""Uncertainty of the first velocity [rad/s] at most."""
+FASTEST = 100.0  # Uncertainty of the first velocity [rad/s] at most
 
 
 @final

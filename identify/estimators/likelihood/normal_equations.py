@@ -18,11 +18,9 @@ from idbench.identify.noise.linearization import observation, slopes
 Solved = tuple[Array, Array, Array]
 """L^-1 A_zX, L^-1 b_nodes, and the factor L of A_zz in bands."""
 
-CHUNK = 4000
-"""Cells whose columns are made at once: those of all would take too much memory."""
+CHUNK = 4000  # Cells whose columns are made at once: those of all would take too much memory
 
-RATE = 50.0
-"""Frequency [Hz] at which the torques' slopes are computed; between they are interpolated."""
+RATE = 50.0  # Frequency [Hz] at which the torques' slopes are computed; between they are interpolated
 
 
 @dataclass(frozen=True, eq=False)

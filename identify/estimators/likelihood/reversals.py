@@ -11,8 +11,7 @@ from idbench.identify.basis.basis import Basis
 from idbench.identify.estimators.likelihood.cells import Cells
 from idbench.identify.noise.linearization import observation
 
-CREEP = 1e-9
-"""Speed [rad/s, of slides m/s] that stands for a sign: friction has its jump there, and nothing else changes."""
+CREEP = 1e-9  # Speed [rad/s, of slides m/s] that stands for a sign: friction has its jump there, and nothing else changes
 
 Ints = npt.NDArray[np.intp]
 

@@ -10,8 +10,7 @@ from idbench.identify.estimators.problem import Problem
 from idbench.identify.estimators.simulating.row_products import Kinds, Solved, solve_with
 from idbench.identify.estimators.simulating.simulated_rounds import Rounds, small_steps
 
-WORSE = 1.2
-"""Growth of the rms of the residuals at which a step counts as too long."""
+WORSE = 1.2  # Growth of the rms of the residuals at which a step counts as too long
 
 Output = Callable[[tuple[MotionLog, ...]], Array]
 """Logs of shape (..., time, joint) -> what is compared, shape (..., r)."""

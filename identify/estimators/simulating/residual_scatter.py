@@ -7,8 +7,7 @@ import numpy as np
 from idbench.identify.arrays import Array
 from idbench.identify.estimators.simulating.row_products import Kinds, Solved
 
-MEMORY = 1.0
-"""Time [s] after which residuals are taken for independent: loops and filters remember less."""
+MEMORY = 1.0  # Time [s] after which residuals are taken for independent: loops and filters remember less
 
 
 def scatter(found: Solved, kinds: Kinds, logs: Sequence[tuple[slice, float]]) -> Array:

@@ -20,14 +20,12 @@ from idbench.identify.estimators.solution import AbstractSolution
 from idbench.identify.models import ExplicitModel
 from idbench.identify.telling import stage
 
-SMALL = 1e-3
-"""Change of a parameter, as a share of what makes the whole torque of a joint."""
+SMALL = 1e-3  # Change of a parameter, as a share of what makes the whole torque of a joint
 
 NOTHING = 1e-2
 """Steps that make less than this share of 0.1 % of the torque count as none, however sure the estimate is of itself."""
 
-UNSETTLED = 1.0
-"""Remaining distance, in sigma, at which an estimate that has not converged is kept after the last step."""
+UNSETTLED = 1.0  # Remaining distance, in sigma, at which an estimate that has not converged is kept after the last step
 
 MAX_DEVIATION, MAX_FIRST_DEVIATION = 0.1, 0.3
 """Rms by which a simulated motion may differ from the logged one in the end, and in the first round, as a share of the rms of

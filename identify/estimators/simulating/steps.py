@@ -6,8 +6,7 @@ import numpy as np
 
 from idbench.identify.arrays import Array
 
-FARTHEST = 1.0
-"""Share of the last two answers' difference by which the next round may begin beyond the last answer."""
+FARTHEST = 1.0  # Share of the last two answers' difference by which the next round may begin beyond the last answer
 
 
 class Steps:
