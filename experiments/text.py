@@ -29,18 +29,14 @@ JOINTS: tuple[Color, ...] = (
 """Colours of the joints' curves, none of which is a model's; the first two are those of the SCARA's links."""
 
 TICKS = 6  # Values that have room beside an axis
-
 NICE = (1.0, 2.0, 2.5, 3.0, 4.0, 5.0, 10.0)  # Steps between the values beside an axis, times a power of ten
-
 ROUNDING = 1e-9  # Share of a step by which a value beside an axis is off as a number
 
 DECADE_STEPS = (1.0,), (1.0, 3.0), (1.0, 2.0, 5.0)
 """Values within a decade that are written beside a logarithmic axis: the first that are more than `ENOUGH`."""
 
 ENOUGH = 2  # Values beside an axis with which it can be read
-
 SIGMAS = 2.0  # Half the width of intervals, in standard errors: 95 %
-
 GREY: Color = (150, 150, 150)  # What was measured, the truth, and marks
 
 FORMS: dict[str, Color] = {
@@ -111,7 +107,6 @@ def kind_colors(kind: str, n: int) -> list[list[int]]:
 
 
 UNBELIEVED = 1e-15  # Probability below which its size says nothing
-
 WORTHLESS = 999.0  # Percentages from here on all say the same
 
 

@@ -14,7 +14,6 @@ Columns: TypeAlias = Mapping[tuple[int, int], Array]
 """Columns of an observation matrix that are not identically zero: (row of an instant, place in X) -> signal (..., time)."""
 
 TINY = 1e-300  # What a logarithm, or a division, takes for zero
-
 HELD = -1  # In the place of a place in X: what torques have beside W X, the part of parameters that are known
 
 Multipliers: TypeAlias = Mapping[tuple[int, int], Array | float]

@@ -6,7 +6,6 @@ from html import escape
 from math import floor, isfinite, log10
 
 SMALLEST, LARGEST = -3, 6  # Powers of ten beyond these are written as such
-
 DIGITS = 1e-13  # Standard errors over values from here on are rounding
 
 Rows = Sequence[Sequence[str]]

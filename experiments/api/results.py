@@ -26,7 +26,7 @@ from idbench.experiments.results.writing import folder_for, write_text
 from idbench.experiments.text import relative
 from idbench.identify import Array, MotionLog, Problem, State, Validation, validate
 from idbench.identify.arrays import combined
-from idbench.identify.judge.torque_interval import TorqueInterval, torque_interval
+from idbench.identify.judge.torque_interval import torque_interval
 from idbench.identify.rows.rows import manageable
 from idbench.identify.tables import concise, html_table, text_table
 from idbench.sim.engine.run import Run
@@ -166,17 +166,14 @@ class Identification:
         state = State(flat[0], flat[1], lambda _: flat[2])
         tau = combined(self.fit.basis.explicit(state), self._of(model).X, np.zeros(flat[0].shape))
         torques = tau.T.reshape(given[0].shape)
-        if interval is None:
-            return torques
-        found = self._interval(interval, model)
-        return torques, np.where(np.abs(given[1]) > found.speed, np.nan, found.half)
+        return torques if interval is None else (torques, self._half(interval, model, np.abs(given[1])))
 
-    def _interval(self, level: float, model: str | None) -> TorqueInterval:
+    def _half(self, level: float, model: str | None, speed: Array) -> Array:
         if not isinstance(level, int | float) or not 0 < level < 1:
             raise ExperimentError(f"predict: interval = {level!r:.40} must be a share between 0 and 1, such as 0.95")
         if (found := torque_interval(self._of(model), level)) is None:
             raise ExperimentError("predict: the rows of this fit are not kept, its log is too long: intervals are not known")
-        return found
+        return np.where(speed > found.speed, np.nan, found.half)
 
     def score(self, log: MotionLog | str | Path, model: str | None = None) -> Score:
         """Return the errors of the torques predicted for a held-out log, or for that of a file as `read_log` reads it.

@@ -13,7 +13,6 @@ from idbench.sim.errors import ScenarioError
 from idbench.sim.settings import NotNegative, make, settings
 
 FILE = "benchmark.toml"  # What states the set of a folder
-
 SHIPPED = Path(__file__).parent / "sets"  # Definitions that ship; their data do not
 
 REQUESTS: Mapping[str, type[IdentifyRequest | ServoRequest]] = {"identify": IdentifyRequest, "servo": ServoRequest}

@@ -11,7 +11,6 @@ from types import FrameType
 from typing import Any
 
 INTERRUPTED = 130  # Exit code after Ctrl-C: 128 + SIGINT
-
 AGAIN = 0.01  # Time [s] after which an interruption that was lost is repeated
 
 

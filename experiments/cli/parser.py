@@ -136,9 +136,7 @@ def _hidden(options: type, names: Sequence[str]) -> int:
 
 
 KINDS: Mapping[type, str] = {int: "a whole number", float: "a number"}  # What options take, in words
-
 CLOSE = 0.7  # Likeness of words from which on one is taken for a slip of the other
-
 COUNTS = ("", "", "two", "three", "four", "five", "six")  # Numbers of values that an option takes
 
 

@@ -20,7 +20,6 @@ from idbench.sim.scenario.scenario_file import load
 from idbench.sim.trajectories import RandomMoves, Reference
 
 FS = 100.0  # Sampling frequency of the examples [Hz]
-
 RUNS = 3  # Runs, or simulations, of the examples
 
 

@@ -11,7 +11,6 @@ from idbench.sim.robot.robot import Robot
 from idbench.sim.scenario.scenario import Physics
 
 COUNT = 2 * np.pi / 2**16  # Step of the encoders by default [rad]
-
 STEP = 1e-3  # Physics step [s]
 
 

@@ -25,11 +25,8 @@ from idbench.sim.trajectories.time_optimal import approach
 from idbench.sim.trajectories.trajectory import AbstractTrajectory, Reference
 
 SIGMA, DETERMINANT = "sigma", "determinant"  # What is minimised by default, and what that begins with
-
 RANDOM, DRAWS = 60, 600  # Random motions that a motion is compared with, and draws after which fewer will do
-
 PREDICTED = 100.0  # Frequency [Hz] at which sigmas are predicted, with the noise that a faster log has in this band
-
 TOGETHER = 10  # Motions whose sigmas are predicted together
 
 WAY, MOST = 0.9, 1e3

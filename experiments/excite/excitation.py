@@ -16,7 +16,6 @@ from idbench.sim.trajectories import Fourier, Quintic
 from idbench.sim.trajectories.trajectory import AbstractTrajectory
 
 FEWEST = 3  # Moves that lead back
-
 REST = 1.0  # Time at rest before and after a motion [s]: as much as filters look to either side
 
 

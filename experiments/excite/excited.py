@@ -23,7 +23,6 @@ from idbench.sim.scenario.scenario_file import to_dict
 from idbench.sim.trajectories.trajectory import Reference
 
 BINDING = 0.9  # Share of a limit from which on it counts as active
-
 STRETCHES = 20  # Parts of a motion whose share in the information about each parameter is shown
 
 

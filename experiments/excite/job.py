@@ -23,11 +23,8 @@ LONGEST, FASTEST = 3600.0, 10000.0
 """Time of a motion, repeated [s], and sampling frequency [Hz] above which they are taken for a slip."""
 
 BITS = 17.0  # Resolution of the encoders without a scenario [bits]
-
 TORQUE_NOISE = (0.05,)  # Rms noise of the torques without a scenario [N m]
-
 QUIET = 1e-6  # Rms noise of a torque below which a number is taken for a slip [N m]
-
 LOUD = 1e6  # The same above which it is [N m]
 
 

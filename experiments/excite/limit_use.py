@@ -16,9 +16,7 @@ from idbench.sim.robot.robot import Robot
 from idbench.sim.trajectories.trajectory import Reference
 
 FS = 1000.0  # Frequency [Hz] at which limits are looked at
-
 BLOCK = 2000  # States whose columns are made together
-
 ROUNDING = 1e-6  # Share by which a limit may be exceeded: coefficients are rounded where they are written
 
 

@@ -16,13 +16,9 @@ if TYPE_CHECKING:
     from idbench.experiments.excite.design import Design
 
 STATES, LEAST = 12.0, 8.0  # States for each period of the highest frequency, and least states a second
-
 MANY = 400  # Most periods of the highest frequency: slopes of more take hours
-
 FINER = 4  # Instants at which limits are kept, for each state
-
 POSTURES = 200  # Random postures over which inertia is averaged
-
 PASS = FirLowPass().cutoff  # End of the pass band of the rows [Hz]
 
 

@@ -10,7 +10,6 @@ from idbench.identify import Array, Estimate, ExplicitModel, MotionLog, brisk_sh
 from idbench.sim.engine.simulation import Progress, simulate
 
 ENOUGH = 0.1  # Weight of a parameter that is known well enough
-
 ROUNDS = 12  # Motions after which it ends, whatever is known
 
 

@@ -32,7 +32,6 @@ LEVEL, NORMAL = 0.95, 1.96
 """Share of instants that the band shall hold, and that of a normal distribution, in its sigma, from its middle."""
 
 SETTLED = 2  # Samples at the beginning of a run that do not count: there the position is that of the log
-
 MOST = 4_000_000  # Values of torques that are drawn at once: 30 MB
 
 USUAL = 0.2

@@ -15,9 +15,7 @@ from idbench.sim.robot.tree import standard_parameters
 from idbench.sim.robot.varied import model_fields
 
 PICTURE = "_band.svg"  # Ending of the name of the picture of the band
-
 QUANTILES = (0.025, 0.5, 0.975)  # The middle of a value, and the ends of the range that holds 95 % of the robots
-
 DIGITS = 6  # Significant digits: draws scatter by far more
 
 JOINT = {"armature": "dof_armature", "damping": "dof_damping", "frictionloss": "dof_frictionloss"}

@@ -12,7 +12,6 @@ from idbench.identify.basis.block import named
 from idbench.sim.robot.tree import standard_parameters
 
 EARTH = [0.0, 0.0, -9.81]  # Gravity as readers of these files have it
-
 SMALLEST = 0.1  # Share of a joint's torque [%] from which on something that is missing is named
 
 

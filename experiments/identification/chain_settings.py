@@ -31,7 +31,6 @@ STAGES: dict[str, Table[Any]] = {
 """The stages of a chain that are plug-ins."""
 
 LOWEST = 0.01  # Band [Hz] below which no joint moves
-
 KIND = "kind"  # Key of a stage's table that names its plug-in
 
 

@@ -20,7 +20,6 @@ from idbench.identify.basis import Balancer
 from idbench.identify.plugins import did_you_mean
 
 AUTO = "auto"  # The laws are those that predict motion best that was not fitted
-
 SMOOTH = "smooth"  # The friction of every joint is a smooth function of its velocity, beside standard laws and load
 
 STANDARD = ("viscous", "coulomb")

@@ -70,9 +70,7 @@ MOST_TURNS = 2.0
 """Turns of a hinge between the ends of a log beyond which degrees are suspected, where the robot gives it no range."""
 
 HARDLY = 0.02  # Share of its range below which a joint hardly moves
-
 MOST_JUMPS = 3  # Jumps of a log that are named
-
 STILL = 1e-3  # A joint that travels less than this share of what the busiest does is at rest, and trembles
 
 

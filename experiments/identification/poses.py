@@ -13,7 +13,6 @@ from idbench.identify.data.log_columns import LogColumns
 from idbench.identify.rows.chain import poses_chain
 
 POSES = "poses"  # Name of their chain
-
 SLOWEST = 0.5  # Sampling period [s] that no log of a robot's motion has: its times are in another unit, or its rows are poses
 
 APART = 0.6

@@ -8,7 +8,6 @@ import numpy as np
 from idbench.identify import Array, Chain
 
 CONTROLLER = "of the scenario's controller"  # Source of a bandwidth that a run states
-
 MOST = 0.99  # Share of the power of the velocities below the bandwidth of a motion
 
 

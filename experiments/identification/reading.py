@@ -29,9 +29,7 @@ DELAY_FOUND = "torque delay estimated from the log"
 """How the note on a delay begins, which those leave out who print it beside the torque."""
 
 LATEST = 1.0  # Delay [s] that no torque of a log has
-
 TURN = 2 * np.pi  # [rad]
-
 NEARLY = 0.2  # Share of a turn by which a jump may differ from one: the joint moves on between two samples
 
 

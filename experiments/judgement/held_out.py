@@ -124,7 +124,6 @@ SAME = 1e-3
 """Share of a standard error up to which parameters of two models are the same: implicit differs from explicit by 1e-5."""
 
 SHAPE = "shape of friction"  # Kind of parameters that enter nonlinearly
-
 LONGEST = 60.0  # Time [s] that is simulated, from the beginning of the held-out log
 
 

@@ -22,17 +22,11 @@ USELESS = 0.5
 instead makes a fifth of it at most."""
 
 ENOUGH = 4  # Rows for each parameter beyond which a large sigma is no matter of too few of them
-
 MUCH_LONGER = 100  # Times from which on the length of a log is not what is wrong with it
-
 FAR = 4.0  # Errors of more than so many sigma are marked: normal ones come once in 16 000
-
 WEAK = 0.5  # Share of its value that the sigma of a parameter may have before it is marked as weak
-
 ALIKE = 0.1  # Share of what an integrator makes of damping by which rotors of a simulation differ from the file's beside that
-
 LINK_SIDE = 3.0  # A rotor's inertia this many sigma below zero is impossible: the torques do not contain the rotor
-
 OPEN = 0.02  # Share of a joint's torque on a brisk motion that one sigma of a parameter may make before it counts as left open
 
 

@@ -23,9 +23,7 @@ from idbench.identify.loads.loaded_robot import LETTERS, LoadedRobot, of_payload
 from idbench.identify.loads.payload import PayloadEstimate, with_robot_held
 
 HEAVIEST = 1e5  # Mass beyond which no gripper holds anything [kg]
-
 FARTHEST = 1e3  # Distance beyond which no gripper holds anything [m]
-
 ROUNDING = 1e-9  # Share of the moments of inertia that is rounding of a drawing
 
 
@@ -69,9 +67,7 @@ def payload_parameters(mass: float | None, at: Sequence[float] | None, inertia: 
 
 
 SURE = 4.0  # Standard errors from which on a contradiction is reported
-
 SHARE = 0.01  # Share of a value below which what contradicts it does not matter
-
 PAYLOAD = "the payload"  # What some warnings are about
 
 OPTIONS = {"ML": "--mass", "MXL": "--at", "MYL": "--at", "MZL": "--at"}

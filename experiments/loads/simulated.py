@@ -24,7 +24,6 @@ from idbench.sim.robot.tree import standard_parameters
 from idbench.sim.scenario.scenario import Scenario
 
 GAINS = (0.7, 1.4)  # True gains are drawn between these multiples of those that logs are read with
-
 MOST_RUNS = 1000  # Runs that are simulated at once
 
 Told = Callable[[float], None]

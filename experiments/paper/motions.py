@@ -27,9 +27,7 @@ from idbench.sim.robot.robot import Robot
 from idbench.sim.robot.scara import scara_truth
 
 COMPARED = ("paper", "paper_masked")  # Chains whose errors are compared with the paper's
-
 TOGETHER = 50  # Motions that are identified together
-
 BAND = (5.0, 95.0)  # Percentiles between which the paper's error counts as explained
 
 

@@ -31,7 +31,6 @@ from idbench.sim.scenario.scenario_file import to_dict
 from idbench.sim.trajectories import Reference
 
 CHAINS_COMPARED = ("paper", "paper_masked", "idbench")  # Chains of the comparison
-
 SCENARIO = "table1"  # The scenario that ships
 
 

@@ -18,9 +18,7 @@ if TYPE_CHECKING:
     import rerun as rr
 
 GOODBYE = 10.0  # How long a viewer may take to take what is still on its way to it, at the end [s]
-
 DEAF = 6  # How often in a row a viewer may fail to take what is sent within half a second
-
 PORT = 9090  # Port of the web viewer
 
 LEAVING = "idbench-leaving"

@@ -14,11 +14,8 @@ from idbench.experiments.text import Color
 from idbench.identify import Array
 
 HEIGHT = 1.0  # Height of a frame: the unit of everything in a chart. 2D views keep the ratio of their axes
-
 WIDE = 2.2  # Width of the frames of charts one above the other
-
 NARROW = 1.4  # Width of the frames of charts in a row
-
 SQUARE = 1.2  # Width of the frames that hold a long list
 
 FRAME: Color = (120, 120, 120)
@@ -26,9 +23,7 @@ GRID: Color = (70, 70, 70)
 TEXT: Color = (170, 170, 170)
 
 LINE = 0.11  # Height of a line of the legend
-
 LINES, BESIDE = 11, 0.75  # Lines of the legend, and how far beside them the next ones stand, if there are more
-
 GRID_ORDER = -3.0  # what is drawn over what: of two things the one of higher order
 DOT_ORDER = -2.0  # dots over the grid
 LINE_ORDER = 1.0  # lines over dots
@@ -46,11 +41,8 @@ _TURNS: dict[Symbol, Sequence[tuple[float, float]]] = {
 SYMBOLS: tuple[Symbol, ...] = tuple(_TURNS)
 
 LETTER, GAP = 0.5, 1.4  # Width of a letter of a legend in a row, and of the room between its entries, in heights of its view
-
 LETTER_BESIDE = 0.016  # Half the width of a letter beside the upright axis, of a chart that is some 220 points high
-
 RAISE = 0.05  # How far texts are raised: the viewer writes them below where they belong
-
 SIZE = 0.016  # Half the width of a symbol
 
 

@@ -19,11 +19,8 @@ from idbench.identify.files.log_file import read_log
 from idbench.identify.tables import concise
 
 SAME_MOTION = 0.8  # Correlation of velocities from which on two logs are of the same motion
-
 BETTER = 0.02  # By how much a shift must correlate better than none
-
 CLEAR = 3.0  # Difference of two estimates, in its sigma, from which on it is marked
-
 LEFT_OUT = ("name", "origin")  # Settings of a scenario that change nothing
 
 

@@ -57,9 +57,7 @@ def record_table1(table: Table1, audience: Audience | None = None) -> list[tuple
 
 
 BEND = 0.01  # Error [%] up to which axes are linear
-
 NOUGHT = 0.005  # Error [%] below which there is none at two decimals
-
 NOTABLE = 1.0  # Error [%] from which on it is written in bold
 
 

@@ -26,9 +26,7 @@ DARK, BRIGHT = np.array([32.0, 32.0, 36.0]), np.array([90.0, 200.0, 120.0])
 """Colours of cells: of a stretch without information, and of the most informative one."""
 
 LEVELS = 8  # Colours that can be distinguished: an entity each, where one for each cell would make a large recording
-
 MAX_ROWS = 13  # Parameters of a chart
-
 NOTABLE = 0.2  # Largest share of a limit below which it is not shown: it is in nobody's way
 
 

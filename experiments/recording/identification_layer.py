@@ -60,7 +60,6 @@ def _send_band(stream: Stream, path: str, t: Array, values: Array, sigma: Array,
 
 
 EVERY = 0.5  # Time between the instants of recursive estimates [s]
-
 WIDE = 7.0  # Width of what a mistake explains, on which the residual is drawn
 
 WIDEST = 0.5

@@ -35,9 +35,7 @@ from idbench.experiments.recording.views import (
 )
 
 HIGHER = 26  # How much higher a layout is than the legend above it
-
 FEW = 2  # Parameters of a study up to which two stand in a row
-
 PAGE = 8  # Parameters of a study that are seen at once
 
 

@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from idbench.experiments.recording.live_layer import LiveIdentification
 
 LOGGED = {"q/measured", "torque/log"}  # What a robot would log: numbered by samples, too, which takes room
-
 ELECTRIC = ("reference", "current", "voltage", "duty", "emf")  # Signals of a drive
 
 

@@ -51,7 +51,6 @@ def _send(stream: Stream, at: str, estimate: Estimate) -> None:
 
 
 MAX_ROWS = 13  # Parameters of a single chart; more have a chart for each joint
-
 ASIDE = 0.22  # How far the models of a parameter stand apart, of its room
 
 
@@ -114,13 +113,9 @@ def _singular_values(stream: Stream, at: str, fit: Fit, number: int) -> None:
 
 
 BINS = {"over_velocity": 41, "over_position": 240}  # Bins of residuals: over position fine enough for a motor of many slots
-
 FEWEST = 5  # Samples from which on a bin has a mean
-
 DOTS = 2500  # Dots of a chart: more would only hide each other
-
 FAINTEST = 1e-3  # What a spectrum shows, as a share of its highest value
-
 DARK: Color = (90, 90, 90)  # What the mask leaves out
 
 

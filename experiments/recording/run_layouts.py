@@ -26,9 +26,7 @@ from idbench.identify.basis.tree_links import KINDS
 DIGITS = "0123456789"
 
 LANES = (0.5, 0.3)  # Height of a view of lanes, and of each lane in it, in heights of a plot: all lanes are in sight
-
 ESTIMATES = 12  # Plots of estimates that have room beside each other
-
 FEW = 3  # Kinds of row that have room one above the other
 
 JOINT_STATES = "green: moves, amber: reverses, red: rests, pink: saturated"

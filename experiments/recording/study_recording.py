@@ -26,11 +26,8 @@ from idbench.experiments.text import FORMS, GREY, JOINTS, Color, lighter
 from idbench.identify import Array
 
 PERCENT = 100.0  # of a share
-
 DOTS = 150  # Runs of a cell that are drawn
-
 MANY = 5  # Values of an axis from which on a small chart writes some only
-
 BESIDE = 0.5  # Share of the room of an axis' value over which models and ways stand beside each other
 
 WORST: Color = (255, 255, 255)
@@ -163,11 +160,8 @@ EDGES = np.arange(-6.25, 6.3, 0.5)  # Bins of errors in sigma; what lies beyond 
 TYPICAL = "*Typical error: geometric mean, over the parameters, of the rms error of all runs.*"
 
 LABEL = 0.2  # Share of an axis that half of a run's label takes
-
 LISTED = 5  # Worst runs that have room beside the charts
-
 EVERY = 2.0  # Least time between two drawings for who watches [s]
-
 REST = 10.0  # The same, as a multiple of what the last drawing took: all runs are drawn anew each time
 
 

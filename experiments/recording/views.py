@@ -9,9 +9,7 @@ from idbench.experiments.recording.chart import HEIGHT, WIDE
 from idbench.experiments.recording.stream import SIZES
 
 LEGEND, EDGE = 0.66, 0.1  # Room to the right of a chart, with a legend and without one, in heights of its frame
-
 KEYS = rrb.VisualBounds2D(x_range=[0, 42], y_range=[-0.5, 0.5])  # What a row of keys shows: some eight of them
-
 ACROSS = 2  # Legends beside each other
 
 Part = rrb.Container | rrb.View | None

@@ -78,11 +78,8 @@ FRICTIONS = ("viscous friction", "Coulomb friction", "friction", "shape of frict
 """Kinds of parameters that make a friction law."""
 
 WHOLE = 0.99  # Share of a row's weights from which on the mask takes nothing of it
-
 BEYOND = 1.3  # Up to which multiple of the speeds of the log a law is drawn
-
 POINTS = 201  # Of a curve to either side
-
 LOADS = (0.05, 0.95)  # Quantiles of the load at which a law that grows with it is drawn
 
 

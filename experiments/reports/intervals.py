@@ -13,7 +13,6 @@ from idbench.identify.arrays import TINY
 from idbench.identify.tables import concise
 
 WIDE, HIGH = 220.0, 14.0  # Size of an interval's picture [px]
-
 ROUNDING = 1e-12  # Value of a file's parameter that is rounding of 0: those that are grouped are sums of products
 
 

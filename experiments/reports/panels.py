@@ -11,17 +11,11 @@ from idbench.experiments.text import decade_values, round_values
 from idbench.identify import Array
 
 WIDTH = 520.0  # Of a panel [px]: two beside each other on a page, one on a telephone
-
 ROW = 96.0  # An inch of a panel's height [px]
-
 LEFT = 46.0  # Room beside a panel for numbers [px]
-
 RIGHT = 8.0  # Room at their other end [px]
-
 TOP = 20.0  # Room for the title [px]
-
 BOTTOM = 20.0  # Room for numbers below a panel [px]
-
 ABOVE = 30.0  # What an inch of a panel's height has for title and numbers [px]
 
 FINE = 2

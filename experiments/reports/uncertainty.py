@@ -18,7 +18,6 @@ ENOUGH = 20.0
 deviation is known to a quarter at best."""
 
 SHOWN = 3.0  # Standard errors that a parameter must exceed for its scatter to be named as a share of it
-
 DISTINCT = 0.05  # Share of its value below which the scatter of a parameter between logs is not named
 
 

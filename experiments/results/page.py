@@ -18,7 +18,6 @@ from rich.text import Text
 from idbench.experiments.errors import ExperimentError, visible
 
 EVERY = 15.0  # Time [s] between lines at the least, where there is no terminal
-
 LONGEST = 55.0  # Time [s] of a stage without a line
 
 
@@ -105,7 +104,6 @@ WIDTH = 144  # Characters of a line where no terminal says how many it has
 
 
 COLORS = {"good": "green", "fair": "yellow", "poor": "red"}  # Of the verdicts
-
 NOT_SAVED = "not saved: --out FOLDER keeps it, with a report and a recording"  # What is said where nobody named a folder
 
 

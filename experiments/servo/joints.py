@@ -30,9 +30,7 @@ SWEEPS = 4
 push each other, a simulated leg was off by 7.6, 0.7, 0.5 and 0.1 mrad after one to four of them."""
 
 PASSES = 2  # Times that joints are fitted to loads that follow from the fits of the others
-
 WORSE = 0.01  # Share by which the error of a joint may rise when offsets are made to agree: as much as searches end apart
-
 UNLOADED = JointLoad(*(np.zeros(()) for _ in range(4)))  # stands in while columns are checked
 
 

@@ -19,7 +19,6 @@ from idbench.identify.servo.parameters import SERVO_PARAMETERS
 from idbench.identify.tables import concise
 
 ALIKE = 1.5  # Error on held-out logs, over that on the fitted ones, up to which a model holds
-
 COUNTS = 0.1  # Counts below which residuals are said in rad: where a log is not rounded
 
 CONFOUNDED = 0.9

@@ -21,7 +21,6 @@ NOISE = 0.01
 """Of the torques, over their own rms: a tenth of what motor currents have, so that a minute's result can be compared."""
 
 LOGS = {"log.csv": 1, "second.csv": 2}  # Files, and the seeds of their motions
-
 MOVES, VELOCITY = 5, 2.0  # Moves of a log for each joint, and their largest speeds [rad/s]
 
 

@@ -12,9 +12,7 @@ from idbench.experiments.study.comparison import SURE, differences
 from idbench.experiments.study.statistics import Cell
 
 LEVELS = (0.1, 0.01, 0.001, 0.0001)  # Typical errors that are asked for
-
 MAX_NAMED = 2  # Errors that are named
-
 LINES = "encoder.lines"  # The setting that people know as bits
 
 

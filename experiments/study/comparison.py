@@ -11,13 +11,9 @@ from idbench.experiments.study.statistics import MIN_ERROR, Cell
 from idbench.identify import Array
 
 SURE = 0.01  # Probability below which two ways of identification count as different
-
 DRAWS = 20_000  # Draws of the permutation test, at least
-
 EACH = 2 / SURE  # Draws for each pair, at least, or Holm's correction would leave nothing significant
-
 TOGETHER = 1000  # Draws that are made at a time
-
 ENOUGH = 200  # Draws with a gap as large from which on no more are needed: nothing is significant then, and p is known to 7 %
 
 

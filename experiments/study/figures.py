@@ -16,17 +16,11 @@ from idbench.experiments.text import FORMS, SIGMAS
 from idbench.identify import Array
 
 OTHER = [90, 90, 90]  # Colour of models that have none of their own
-
 MANY = 16  # Parameters beyond which one picture shows all of them, instead of a panel each
-
 ACROSS = 3  # Panels beside each other
-
 TICKS, SMALL_TICKS = 8, 4  # Values of an axis that have room beside it, of a large panel and of a small one
-
 PANEL = 2.2  # Height of a panel [inch]
-
 REACH = 4.0  # How far panels of error bars reach, over the median of the bars
-
 WIDE = 8.0  # Ratio of the largest to the smallest value above which an axis is logarithmic
 
 

@@ -13,7 +13,6 @@ from idbench.experiments.study.store import Store
 from idbench.experiments.study.study_file import load_study
 
 MANY = 100_000  # Runs beyond which a study is taken for a slip unless it is said to be meant: days of a machine
-
 LARGEST_SHARD = 64  # Runs that are simulated together at most
 
 

@@ -36,7 +36,6 @@ from idbench.sim.scenario.scenario import Scenario
 from idbench.sim.trajectories import Reference
 
 START = 5  # Stream of random numbers of where estimators begin
-
 FARTHEST = 3.0  # Standard deviations at most by which a start is off
 
 PARTS = ("", ".sigma", ".paper_sigma", ".truth")

@@ -13,11 +13,8 @@ from idbench.experiments.text import SIGMAS
 from idbench.identify import Array
 
 CONFIDENCE = 0.95  # Of every interval
-
 DRAWS = 300  # Of a bootstrap: its ends are then known to a tenth of its width
-
 RIGHT = float(2 * scipy.special.ndtr(SIGMAS) - 1)  # Coverage if sigma is right and errors are normal
-
 MIN_ERROR = 1e-16  # Relative error that counts as none: logarithms of 0 would say too much of rounding
 
 BOUNDS = (".bound", ".bound_through_reversals")

@@ -27,7 +27,6 @@ Kind = Literal[
 ]
 
 BODY: frozenset[Kind] = frozenset({"inertia", "first moment", "mass"})  # Kinds of parameters of a rigid body
-
 RIGID: frozenset[Kind] = BODY | {"rotor inertia"}  # Kinds of parameters of what has inertia
 
 FRICTION: frozenset[Kind] = frozenset(

@@ -14,7 +14,6 @@ from idbench.identify.data.log_columns import LogColumns
 from idbench.identify.errors import LogError
 
 LONGEST = 0.05  # Time [s] without a row beyond which a log is cut: what a robot does meanwhile nobody knows
-
 STEADY = 0.01  # Departure of a time step from the mean step, as a share of it, up to which stamps are as good as a steady clock
 
 ROUGHER = 0.95

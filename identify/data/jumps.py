@@ -12,9 +12,7 @@ import scipy
 from idbench.identify.arrays import Array
 
 OFF = 0.05  # Share of a step by which a difference of positions may miss a whole number of steps: files are rounded
-
 MIN_DIFFERENCES = 20  # Differences that it takes
-
 MAX_STEPS = 1000  # Steps of a difference up to which rounding of the step itself does not matter
 
 
@@ -61,13 +59,9 @@ COMMON = 0.99
 """Share of the steps from one sample to the next that are below what is usual: those above may be the fastest of a motion."""
 
 NEAR = 2  # Steps to either side that a step is compared with
-
 SPREAD = 3.0  # A step jumps if it is farther from the median of its neighbours than this many times their scatter
-
 RETURN = 0.2  # Share of a jump that may be left after it has gone back
-
 ROUNDING = 1e-3  # Share of the largest travel of a joint that no jump is below
-
 COUNTS = 2.5  # Steps of its encoder that no jump is below: quiet joints tremble by one, and creep by one after the other
 
 
@@ -139,13 +133,9 @@ def _of_joint(j: int, x: Array, least: float, fs: float) -> list[Jump]:
 
 
 BAND = 5.0  # Frequency [Hz] up to which velocities are compared with differences
-
 ALIKE = 0.03  # Departure of velocities from differences, as a share, up to which they are in the same unit
-
 LATE = 0.5  # Delay of velocities, in sampling periods, up to which they are of the same instants
-
 ORDER = 6  # Differences of a signal after which next to nothing of a motion is left, and of white noise much
-
 HIGHEST = 10.0  # Frequency [Hz] above which less noisy velocities do not matter: little of a motion is there
 
 
@@ -231,3 +221,16 @@ def white_noise(x: Array) -> Array:
     """Return the standard deviation of white noise, from differences of higher order, shape (joint,)."""
     differences = np.diff(x, ORDER, axis=0)
     return np.asarray(np.sqrt(np.median(differences**2, axis=0) / 0.4549 / comb(2 * ORDER, ORDER)))
+
+
+THIRD = 3  # Order of the differences of velocities in which motion vanishes beside noise
+QUIET = 0.8  # Quantile of the absolute third differences of velocities that measures their noise: most of any motion is smooth
+
+
+def velocity_noise(qd: Array) -> Array:
+    """Standard deviation of white noise in velocities of shape (..., time), from their third differences; 0 of too few."""
+    if qd.shape[-1] <= THIRD:
+        return np.zeros(qd.shape[:-1])
+    kinks = np.abs(np.diff(qd, THIRD, axis=-1))
+    size = scipy.special.ndtri((1 + QUIET) / 2) * np.sqrt(scipy.special.comb(2 * THIRD, THIRD))
+    return np.asarray(np.quantile(kinks, QUIET, axis=-1) / size)

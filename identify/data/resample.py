@@ -15,13 +15,9 @@ from idbench.identify.data.motion_log import MotionLog, TorqueChannel
 from idbench.identify.errors import LogError, require_positive
 
 MOST_SAMPLES = 1e8  # Samples above which a frequency is taken for a slip
-
 LEAST_VELOCITIES = 50  # Samples from which on logged velocities are compared with differences
-
 FEW = 4  # Rows that an interpolation takes
-
 SHORTEST = 1.0  # Pieces between gaps that are shorter than this [s] are left out
-
 NICE = 2e-3  # Share by which a sampling frequency may be off a round one that is then taken
 
 

@@ -10,7 +10,6 @@ import numpy as np
 from idbench.identify.arrays import Array
 
 SINGULAR = 1e-13  # Share of the largest eigenvalue, of scaled information, below which a direction counts as not told
-
 HIDDEN = 1e-6  # Share of a parameter in such directions from which on it is unknown
 
 

@@ -15,13 +15,9 @@ POWER = 64.0
 """Of the norm that stands for the largest of many values, and is smooth; less is smoother, and further below the limits."""
 
 NEAR = 0.97  # Share of a torque limit from which on it costs: states lie between those that are looked at
-
 HARD = 30.0  # What exceeding a limit by all of it costs, squared; halving all sigmas gains 0.7
-
 NOTHING = 1e6  # What motions cost that leave a parameter unknown
-
 SLACK = 0.99  # Share of the limits that motions use, since limits are kept at instants
-
 WAY = np.linspace(0.0, 1.0, 12)[1:-1]  # Shares of the way from home at which it is looked at
 
 Obstacles = Callable[[Array], tuple[float, Array]]

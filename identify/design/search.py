@@ -14,11 +14,8 @@ from idbench.identify.design.plan import Plan
 from idbench.identify.design.shapes import quintic
 
 POOL = 200  # Moves to choose from, each time
-
 INSTANTS = 8  # States of a move
-
 FIRST = 1e-3  # Share of a move's information that counts as known before the first: it makes the matrix regular
-
 PEAKS = 15 / 8, 10 / np.sqrt(3)  # Largest velocity and acceleration of a fifth-order move of unit length and time
 
 

@@ -12,7 +12,6 @@ from idbench.identify.arrays import Array
 from idbench.identify.estimators.log_rows import LogRows
 
 STRETCH = 2.0  # Length of a stretch [s]: residuals of real robots are correlated over 0.2 to 3 s
-
 FEWEST = 5  # Stretches at least; those of short logs are shorter
 
 RIDGE, NOTHING = 1e-11, 1e-200

@@ -29,7 +29,6 @@ Weights = Literal["measured", "own"]
 Reduced = TypeVar("Reduced")
 
 SAMPLED = 8  # Pieces of long logs from which noise is estimated and propagated
-
 BEGIN, LEAST = (1.0, 0.1, 0.1), 1e-4  # Shares of the errors of rows of which one kind is not alike, to begin with, and at least
 
 

@@ -21,15 +21,10 @@ from idbench.identify.rows.rows import Rows
 from idbench.identify.signals.signals import State
 
 ROUNDS = 30  # At most; most laws take five
-
 COARSE, FINE = 6, 32  # Values of a shape that are looked at to begin with, and once it has converged
-
 FEWEST = 4  # Values of each shape of a law with several
-
 AGAIN = 2  # How often others are looked at, at most
-
 SETTLED = 1e-3  # Steps below this share of sigma no longer matter
-
 SHARES = (0.5, 0.25, 0.1, 0.0)  # Of a step, in turn, until the rows are explained better
 
 

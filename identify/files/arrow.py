@@ -19,9 +19,7 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 TORQUE = b"idbench.torque"  # Key of what a Parquet file says of its torque
-
 BOM = b"\xef\xbb\xbf"  # How some programs begin a file of UTF-8
-
 LARGEST = 2**53  # Integers up to this are numbers of double precision
 
 NUMBER = r"[-+.\deE,]*\d[-+.\deE,]*|[-+]?(nan|inf|infinity)"

@@ -46,7 +46,6 @@ MOST_BLOCKS = (3, 4, 5, 6, 7, 8)
 """Quantities of each joint that a file without names may have: positions, velocities, accelerations, torques, set points."""
 
 FEWEST = 10  # Rows that a guess takes
-
 ALIKE = 0.2  # Departure of a column from the derivative of another, as a share, up to which it is its velocity
 
 

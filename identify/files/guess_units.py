@@ -12,7 +12,6 @@ from idbench.identify.files.table import SI, LogTable, factor, named_unit
 CURRENTS = ("current", "currents", "cur", "amps")
 
 FARTHEST = 4 * np.pi  # Positions [rad] beyond which degrees are suspected
-
 STRONGEST = 3e3  # Torques [N m] beyond which mN m are suspected
 
 

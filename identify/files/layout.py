@@ -19,13 +19,9 @@ OF_SERVOS = ("command", "forward", "on", "voltage")
 the supply."""
 
 QUANTITIES = ("t", "q", "qd", "tau", "temperature", *OF_SERVOS)  # What columns may be
-
 UNLOGGED = ""  # Name of the column of a joint of which a quantity was not logged
-
 SINGULAR = 1e-12  # Determinants below this are none
-
 SLOWEST, FASTEST = 1e-3, 1e7  # Sampling frequencies [Hz] outside of which a slip is suspected
-
 LAYOUT = "log.toml"  # Name of the file that says what all logs of its folder hold
 
 

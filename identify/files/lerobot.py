@@ -6,7 +6,6 @@ from pathlib import Path
 from idbench.identify.errors import LogError
 
 INFO = Path("meta") / "info.json"  # What describes a data set
-
 SUFFIX = ".pos"  # What names of its joints end with
 
 

@@ -12,7 +12,6 @@ from idbench.identify.files.arrow import TORQUE, arrow
 from idbench.identify.files.reading import read_columns
 
 CSV = ".csv"  # What the name of a CSV file ends with
-
 WRITTEN = (CSV, ".parquet")  # What names of files end with that idbench writes
 
 

@@ -18,9 +18,7 @@ from idbench.identify.files.standard import standard_layout
 from idbench.identify.files.table import SI, LogTable, needs_gain
 
 CLOCKS = 1e6  # Times [s] beyond this are those of a calendar: logs count from their beginning
-
 MIN_GAIN, MAX_GAIN = 1e-9, 1e9  # Sizes of gains beyond which they are slips
-
 LAYOUT_FILE = ".toml"  # What the name of a layout ends with, which may be given in the place of a log
 
 

@@ -22,7 +22,6 @@ KEYS = ("model", "gain_unit", *(field.name for field in fields(Servo) if field.n
 """What a servo may state."""
 
 WORDS = ("model", "gain_unit", "kind")  # Of these, what is no number
-
 COUNTS = 4096  # Counts of a servo's encoder that are assumed where neither they nor a model are stated, as of most
 
 MAX_OVER_SUPPLY = 1.5

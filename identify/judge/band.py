@@ -11,11 +11,8 @@ from idbench.identify.judge.used_rows import OF_NYQUIST
 from idbench.identify.signals.spectra import welch
 
 ENOUGH = 4  # Instants for each parameter below which a fit starves
-
 ABOVE = 4.0  # Power over that of the noise up to which a frequency still counts as content
-
 SEGMENT = 2.0  # Length of the pieces whose spectra are averaged [s]
-
 FLOOR = (0.6, 0.95)  # Part of the spectrum, as shares of the Nyquist frequency, that is taken for noise
 
 

@@ -1,6 +1,6 @@
 """The delay of a log's torque, from the log alone."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,8 +10,8 @@ from idbench.identify.arrays import Array
 from idbench.identify.basis.basis import Basis
 from idbench.identify.data.motion_log import MotionLog, TorqueChannel
 from idbench.identify.errors import ExcitationError, LogError, RangeError, SettingError
-from idbench.identify.estimators.leave_out import Stretches, left_out
 from idbench.identify.estimators.problem import Problem
+from idbench.identify.judge.delay_step import delay_step, newton
 from idbench.identify.minimum import minimum
 from idbench.identify.models import ExplicitModel
 from idbench.identify.rows.chain import Chain, idbench_chain
@@ -24,11 +24,7 @@ WIDER, FARTHEST = 3.0, 0.6
 """How many times farther each further look goes, and how far at most [s]: two clocks of a recorder may be that far apart."""
 
 SHARE = 0.05  # Share of a log that a delay may be: its rows must lie inside the log at all delays
-
-ROUNDS, SETTLED = 10, 0.1  # Newton steps at most, and share of a sigma below which the last one must be: 1 % of sigma^2
-
 DIFFERENT = 0.01  # Probability, of logs with one delay, below which their delays count as different
-
 _COARSE = 15  # Delays of a first look, which brackets the smallest misfit
 
 
@@ -159,7 +155,7 @@ def estimate_joint_delays(
         mean = float(delays.mean())
         return DelayEstimate(mean, 0.0, tuple((delays - mean).tolist()))
 
-    delays, sigma, settled = _newton(
+    delays, sigma, settled = newton(
         lambda delays: _delayed(problem, of(delays)),
         np.full(basis.n, common.delay),
         lambda each: [np.stack(part.delay_slopes(each=True), axis=-1) for part in each.parts],
@@ -188,78 +184,6 @@ def nearby_delay(problem: Problem) -> DelayEstimate:
     """
     (step,), (sigma,) = delay_step(problem.explicit, _slopes(problem.explicit))
     return DelayEstimate(problem.logs[0].torque.delay + float(step), float(sigma))
-
-
-def torque_lateness(problem: Problem, j: int, late: float) -> float:
-    """How late the torque of a joint is [s], by Newton steps from about where it is.
-
-    Parameters
-    ----------
-    problem : Problem
-        The explicit model, whose rows are kept.
-    j : int
-        The joint, from 0.
-    late : float
-        Lateness to first order [s].
-    """
-
-    def earlier(late: Array) -> Problem:
-        lags = [np.array(log.torque.lags or np.zeros(log.n)) - float(late[0]) * np.eye(log.n)[j] for log in problem.logs]
-        each = zip(problem.logs, lags, strict=True)
-        return problem.with_logs([replace(log, torque=replace(log.torque, lags=tuple(x.tolist()))) for log, x in each])
-
-    found, _, _ = _newton(
-        earlier, np.array([late]), lambda each: [-part.delay_slopes(each=True)[j][:, None] for part in each.parts]
-    )
-    return float(found[0])
-
-
-def _newton(
-    delayed: Callable[[Array], Problem],
-    delays: Array,
-    slopes: Callable[[Problem], list[Array]],
-    within: tuple[float, float] = (-np.inf, np.inf),
-) -> tuple[Array, Array, bool]:
-    """Delays after Newton steps, delta(k+1) = delta(k) + step, their standard errors, and whether the last step was small.
-
-    None goes beyond a range.
-    """
-    for _ in range(ROUNDS):
-        problem = delayed(delays)
-        step, sigma = delay_step(problem, slopes(problem))
-        if not ((within[0] <= delays + step) & (delays + step <= within[1])).all():
-            return delays, sigma, False
-        delays = delays + step
-        if (np.abs(step) <= SETTLED * sigma).all():
-            return delays, sigma, True
-    return delays, sigma, False
-
-
-def delay_step(problem: Problem, slopes: Sequence[Array]) -> tuple[Array, Array]:
-    """Newton step of delays and its standard error, which the jackknife over stretches shows, shape (k,) each [s].
-
-        [X; delta] = argmin (Y + D delta - W X)' C^-1 (Y + D delta - W X)
-
-    Parameters
-    ----------
-    problem : Problem
-        The explicit model, whose rows are kept.
-    slopes : sequence of Array, shape (r, k)
-        D = dY/d(delays) of the rows of each log [N m/s]; a column of zeros gives a step of zero.
-    """
-    parts, stretches = problem.parts, Stretches.of(problem.parts)
-    rows = [
-        part.whitening.whiten(np.column_stack([part.unbiased.W, -D, part.rows.Y]))
-        for part, D in zip(parts, slopes, strict=True)
-    ]
-    found = left_out(stretches.products(parts, rows))[:, -slopes[0].shape[-1] :]
-    return found[-1], jackknife(found[:-1])
-
-
-def jackknife(found: Array) -> Array:
-    """Standard deviations of what is estimated without each stretch, shape (stretch, k)."""
-    count = len(found)
-    return np.asarray(np.sqrt((count - 1) / count * np.sum((found - found.mean(axis=0)) ** 2, axis=0)))
 
 
 def _slopes(problem: Problem) -> list[Array]:
@@ -321,7 +245,7 @@ class _Search:
 
         Steps leave it where the model is far off.
         """
-        found, sigma, settled = _newton(
+        found, sigma, settled = newton(
             lambda delay: replace(self._problem, logs=self._delayed(float(delay[0]))), np.array([delay]), _slopes, within
         )
         if not settled:

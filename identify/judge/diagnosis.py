@@ -23,9 +23,7 @@ DRIVING: tuple[Kind, ...] = ("viscous friction", "Coulomb friction")
 """Kinds of friction that are both negative where a torque has the other sign; one may be by a wrong delay."""
 
 MOVES = 100.0  # Standard deviations of the noise of a position beyond which a joint moves, and does not flicker by a count
-
 STATES = 100  # Of a log, at which inertias are looked at
-
 SAMPLES = 20.0  # Samples for each period of the operator's cut-off with which large mistakes are looked for
 
 

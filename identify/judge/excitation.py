@@ -50,9 +50,7 @@ def _keys(log: MotionLog | LogColumns) -> npt.NDArray[np.void]:
 
 
 TELLING = 1e-6  # Variance of a direction of the difference, over the largest, below which it is rounding
-
 LEVEL = 0.05  # Probability of a difference that large by chance, below which it is said to be real
-
 MATTERS = 0.5  # Difference in sigma from which on it matters: half a sigma of bias makes 95 % intervals hold the truth in 92 %
 
 
@@ -108,9 +106,7 @@ def noise_in_rows(estimate: Estimate) -> NoiseInRows:
 
 
 ENOUGH = 0.2  # Share of what a parameter adds of its own to the torques while all joints move, from which some of them will do
-
 MOST_JOINTS = 3  # Joints of a move; what takes more of them counts as needing all
-
 STATES = 200  # Random states of a move
 
 

@@ -19,7 +19,6 @@ from idbench.identify.data.kinematics import KinematicTree
 from idbench.identify.signals.signals import State
 
 SETTLING = 0.2  # Time over which loads are averaged that teeth of gears carry [s]: a period of the usual band
-
 SMALL = 1e-4  # Step of differences [rad, m, 1], small beside what robots move, large beside rounding
 
 

@@ -20,7 +20,6 @@ from idbench.identify.signals.masks import NoMask
 from idbench.identify.signals.signals import State
 
 SURE = 1.5  # A law is taken when what it gains is this many times the standard deviation of that over the stretches
-
 PLAIN = 5.0  # Its parameter is at least so many sigma away from zero: of a hundred laws and joints none is there by chance
 
 SOLID = 0.2
@@ -28,11 +27,8 @@ SOLID = 0.2
 taken in 12 logs of three simulated robots that have none; above 0.25 a TX40's third joint lacks its load, half of its error."""
 
 WORSE = 0.25  # Share of the squared error that a law may add at speeds above those of a fit: an eighth of the error
-
 BEST = 2  # So many of the laws that take most are compared with shapes that are their own
-
 BEYOND = (-2.0, -1.0, 1.0, 2.0)  # Speeds at which friction must not fall, over the highest of the logs
-
 WORTH = 0.02  # Least share of a joint's squared error that a law must take: less is of no use, and of a chain's own errors
 
 

@@ -19,9 +19,7 @@ from idbench.identify.estimators.settle import Candidates
 from idbench.identify.rows.factors import Status
 
 GRID = 32  # Values of each unknown shape of a law that are compared
-
 LOOKED = 4  # Of these, those that explain all rows best are compared on rows that are left out
-
 FOLDS = 10  # Stretches of the logs, each of which is predicted by a fit of the others
 
 FAST = 0.8

@@ -14,14 +14,12 @@ from idbench.identify.data.kinematics import KinematicTree
 from idbench.identify.judge.fitted_motion import SMALL, FittedMotion
 
 CREEP = (0.1, 0.3)  # Velocities over a joint's rms speed above which friction near rest fades
-
 PRESLIDING = (0.01, 0.03, 0.1)  # Distances over the rms of a joint's positions in which friction turns
 
 TURNS = tuple(range(2, 13))
 """Waves of a torque ripple a turn: of harmonic drives and motors with few poles, as far as rows of 5 Hz show them."""
 
 PARTING = 0.1  # Torque over the rms of a joint's within which teeth of its gear change sides
-
 LONG = 0.3  # Share of the largest distance between joints beyond which that of one is not a little off
 
 Rows: TypeAlias = Mapping[int, Array]

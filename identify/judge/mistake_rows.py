@@ -24,17 +24,11 @@ from idbench.identify.judge.mistakes import (
 from idbench.identify.signals.signals import State
 
 RATE = 10.0  # Instants at which columns are made, in multiples of the operator's cut-off: they are smooth where rows count
-
 USUAL = 5.0  # Cut-off of an operator that states none [Hz]
-
 AT_ONCE = 2_000_000  # Values of columns that are filtered at once: some 16 MB
-
 OF_HINGES = frozenset({"eccentric", "cogging"})  # Mistakes of what turns
-
 INSTANTS = 12  # Instants from which on something may have changed: a twelfth of a log apart
-
 PUSH = 0.3  # Time [s] that a collision takes, about: a robot that hits something stops, or gives way
-
 SLOWEST = 0.5  # Least frequency [Hz] at which a base is taken to move by itself
 
 LINE = 12.0

@@ -10,7 +10,7 @@ import scipy
 from idbench.identify.arrays import TINY, Array
 from idbench.identify.errors import IdentificationError
 from idbench.identify.estimators.problem import Problem
-from idbench.identify.judge.delay import torque_lateness
+from idbench.identify.judge.delay_step import torque_lateness
 from idbench.identify.judge.mistake_rows import Candidate, MistakeRows, held_torque
 from idbench.identify.judge.mistakes import COLLISION, GAIN
 from idbench.identify.judge.stretches import errors_of_stretches, scatter_of_sums
@@ -29,17 +29,11 @@ WORTH, MATTERS = 0.98, 0.02
 has errors of its own, of some 1e-5 %, and no drive is known to a fiftieth of a per cent."""
 
 PUSHED = 0.02  # Torque of a push, over the rms of the joint's, above which it is one: less is what any model leaves somewhere
-
 ALIKE = 0.8  # Share of what a mistake explains that another one must explain to be its alternative
-
 MOST = 3  # Mistakes that are looked for, one beside the other
-
 MEDIAN = 0.4549  # Of chi squared with one degree of freedom
-
 FEWEST, MANY = 2, 100_000  # Rows a parameter, and rows at most: hundreds of columns of as many take a GB
-
 ROUNDS = 5  # Of the gain of a torque, which is not small where a constant is wrong by tenths
-
 SOME = 6  # One of so many tests is made whatever it says, to see how they scatter
 
 

@@ -14,10 +14,9 @@ from idbench.identify.estimators.problem import Problem
 from idbench.identify.models import ExplicitModel
 from idbench.identify.rows.operators import FirLowPass
 from idbench.identify.signals.masks import NoMask, slow_speed
-from idbench.identify.signals.prefilters import FirPrefilter
+from idbench.identify.signals.prefilters import NoisePrefilter
 
 BAND = 10.0  # Frequency [Hz] up to which torques are judged: what drives and controllers of arms use of a model
-
 OF_NYQUIST = 0.4  # Share of the Nyquist frequency above which no band goes: filters and differences need room
 
 
@@ -46,7 +45,7 @@ class UsedRows:
     def _of_log(cls, problem: Problem, log: MotionLog) -> Self:
         chain, band = replace(problem.chain, mask=NoMask(), trim=None), min(BAND, OF_NYQUIST * log.fs / 2)
         if not log.poses:
-            chain = replace(chain, prefilter=FirPrefilter(3 * band), operator=FirLowPass(band, band))
+            chain = replace(chain, prefilter=NoisePrefilter(3 * band, 0.0), operator=FirLowPass(band, band))
         signals = chain.signals(log)
         rows = chain.rows(signals, problem.basis, ExplicitModel())
         speed = np.abs(signals.state.qd)

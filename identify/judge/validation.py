@@ -20,18 +20,14 @@ from idbench.identify.rows.operators import AbstractOperator
 from idbench.identify.rows.rows import Rows
 
 LAGS = 10  # Rows over which residuals are compared with themselves
-
 FAINT = 0.5  # Rows of which the mask leaves less than this share say little, and are not compared
-
 WHITE = 0.95  # Share of white residuals that are called white
 
 MARGIN = 1.3
 """Errors up to this multiple of what noise and sigma make are explained by them: levels of noise are known to some 20 %."""
 
 EXCUSED = 0.02  # Share of the torque up to which sigma of the parameters excuses an error: a misfit makes sigma large, too
-
 ROUNDING = 1e-12  # Share of the largest predicted torque below which one is rounding
-
 HELD_OUT = 0.25  # Share of a log, at its end, that is held out where there is no second log
 
 

@@ -26,20 +26,15 @@ DECISIVE = 40.0
 steps, four sigma of independent ones."""
 
 RATES = (0.8, 0.9, 0.95, 1.05, 1.1, 1.25)  # Rates of the clock, over the stated one, that are tried where something is wrong
-
 RATE_STEP = 0.07  # How far from the best of them, as a share, a better one is looked for: as far as to the next
-
 NEARLY = 0.6  # Share of what a small mistake takes of the likelihood from which on a large one is its alternative
-
 MOST = 3  # Large mistakes that are tried on held-out stretches, the most likely first
-
 ENOUGH = 20.0  # Rows a parameter with which many mistakes are looked for before all of a log is asked
 
 NOTHING_LEFT = 1 / 3
 """Share of the largest error that the right sign or axis leaves at most: a wrong one also explains a part of other mistakes."""
 
 GRAVITY = 9.81  # [m/s^2]
-
 ALMOST_NONE = 1e-3  # Share of gravity in torques that are without it: so little that parameters stay apart
 
 

@@ -16,13 +16,9 @@ from idbench.identify.loads.loaded_robot import LoadedRobot
 from idbench.identify.models import ExplicitModel
 
 ROUNDS = 20  # At most; most logs take four
-
 SETTLED = 1e-2  # Steps below this share of sigma no longer matter
-
 FACTOR = 1.5  # By which a gain changes at most from one round to the next
-
 SURE = 4.0  # Standard deviations from which on a gain below zero is no chance
-
 VAGUE = 0.1  # A gain with a sigma above this share of it is unidentifiable from the payload
 
 

@@ -21,7 +21,6 @@ from idbench.identify.models import ExplicitModel
 from idbench.identify.parameters.bodies import inertial, pseudo_inertia
 
 REPEATED = 0.05  # Rms distance of two motions [rad or m] up to which they count as one that was repeated
-
 MIN_EIGENVALUE = 1e-6  # Least eigenvalue of a body's pseudo-inertia, as a share of the largest
 
 

@@ -19,7 +19,6 @@ RATE, EDGES = 50.0, 200.0
 At 100 Hz sigma of motions that are slow throughout is off by up to 13 %, at 200 Hz by up to 6 %, of others by 2 %."""
 
 ALIASED = 0.01  # Share of a variance by which it may be off for being summed at few samples: 0.5 % of sigma
-
 TAIL = 1e-4  # Share of the energy of a response, at either end, that is left out
 
 

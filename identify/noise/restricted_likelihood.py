@@ -20,7 +20,6 @@ from idbench.identify.rows.factors import Factor, triangular
 from idbench.identify.rows.rows import Rows
 
 ROUNDS, SETTLED = 20, 0.01  # Rounds at most, and change, in all that the levels make of the rows, at which they count as found
-
 STILL = 0.02  # Change of X, in its sigma, at which the levels count as found
 
 HASTY, HASTE = 1, 1.5
@@ -32,7 +31,6 @@ RIDGE = 1e-6
 """Share of its own that is added to the information about each square: two that do the same to rows are both left there."""
 
 LOWEST = 1e-3  # Share of the torque's rms at which its noise begins at least: what begins at nothing hardly grows
-
 SMALLEST = 1e-9  # Noise of positions [rad] at least: rounding, of a log in single precision
 
 

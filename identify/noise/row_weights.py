@@ -14,7 +14,6 @@ from idbench.identify.rows.rows import Rows
 from idbench.identify.signals.signals import Signals
 
 ROUNDS = 6  # Iterations: each takes nine tenths of the error away
-
 FAINT = 1e-3  # Expectations below this share of the mean count as this: what is found there says more about the expectation
 
 

@@ -17,9 +17,7 @@ from idbench.identify.signals.filters import slide
 from idbench.identify.signals.signals import Signals
 
 OVERLAP = 0.1  # Share of a log that must lie over itself for what it says of a lag to count
-
 MAX_SAMPLES = 2**18  # Samples that a log is looked at
-
 PRECISE = 1e-12  # Share of the mean square of the positions below which differences of them are rounding of our own
 
 
@@ -71,7 +69,6 @@ def _repeats_of(log: MotionLog, sigma: Array) -> Array:
 
 
 MIN_SAMPLES = 32  # Samples that it takes to estimate noise
-
 EXACT = 1e-5  # Share of the torque's rms that counts as noise at least: no model of a robot is better
 
 

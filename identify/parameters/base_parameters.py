@@ -18,7 +18,6 @@ STATES = 56
 """Random states for each joint: four for each of its fourteen standard parameters, with a rotor and three laws of friction."""
 
 ENOUGH = 4  # Joints beyond which more of them need no more states
-
 SEED = 0  # Of the random states: any others give the same grouping, up to rounding
 
 DEPENDENT = 1e-3

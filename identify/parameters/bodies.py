@@ -157,7 +157,6 @@ class Bodies:
 
 
 FASTER = 10.0  # What the weight is divided by from stage to stage: each begins near its end
-
 STEPS = 100  # Newton steps of a stage at most; some five are usual
 
 CENTRED, CLOSE = 0.1, 1e-8
@@ -167,7 +166,6 @@ SHARE = 0.9
 """Share of the way to the border of what bodies can have that a step goes at most: far too thin ones are slow to grow again."""
 
 LEAST_STEP = 1e-10  # Share of a step below which nothing is gained but rounding
-
 ROUNDING = 1e-13  # Share of the objective by which it may rise: rounding
 
 

@@ -13,7 +13,6 @@ from idbench.identify.parameters.bodies import Bodies, nearest
 from idbench.identify.rows.factors import AbstractPrior, triangular
 
 ROUNDS, CLOSE = 60, 0.01  # Iterations of the evidence at most, and the relative change of a size at which they end
-
 LEAST = 1e-3  # Least size, over the one that the evidence begins with: no log shows a thousandth of a torque
 
 DECIDED = 0.1

@@ -60,7 +60,7 @@ class Chain:
         def velocities() -> Array:
             return self.differentiator.derivative(np.ascontiguousarray(np.swapaxes(log.q, -1, -2)), log.fs)
 
-        return self.prefilter.suited(velocities, log.fs)
+        return self.prefilter.suited(velocities)
 
     def grid(self, log: MotionLog) -> Grid:
         """Return where the rows of `log` lie; raise LogError if it leaves none, SettingError if a setting does not fit it."""

@@ -16,9 +16,7 @@ from idbench.identify.rows.factors import Factors
 from idbench.identify.rows.row_map import RowMap, in_order
 
 PIECE = 6e5  # Samples times joints squared of a piece: columns grow with the joints squared, and take some 100 MB
-
 BYTES = 1.6e7  # Of columns that are made at once: they stay in a cache, and little of a log is looked at twice
-
 LONG = 1e7  # Samples times joints squared, of all logs of a fit, beyond which rows are not kept
 
 

@@ -15,7 +15,6 @@ from idbench.identify.servo.run import ServoRun
 from idbench.identify.servo.stages import Stages
 
 MIN_SHARE = 0.01  # Share of the samples from which on what a joint is doing is judged
-
 SLOW = 0.05  # Speed below which a joint rests, as a share of the speed that it exceeds in 1 % of the samples
 
 
@@ -58,7 +57,6 @@ def _spread(x: Array, length: int) -> Array:
 
 
 LEVEL = 0.05  # p value, of all comparisons together, below which a law is better
-
 PER_PARAMETER = 2  # Parts of the log per parameter of the largest law, each predicted without it
 
 

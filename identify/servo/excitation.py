@@ -10,13 +10,9 @@ from idbench.identify.errors import ExcitationError, IdentificationError
 from idbench.identify.servo.run import ServoRun
 
 TILTS = 0.01  # Share of gravity that turns with the joint, of its typical torque, from which on an offset of the position shows
-
 TYPICAL = 0.1  # Share of what a loop commands that a joint needs which carries nothing
-
 NOTHING = 1e-6  # Share of what a loop commands that no known load makes: rounding of the robot's file
-
 SCALES = ("a", "b", "Ia", "Fs", "Fv")  # Parameters of which one that is known sets the scale of torques
-
 DEGREES = 20.0  # Times the range of the positions from which on commands are in another unit
 
 

@@ -168,7 +168,6 @@ class ServoFit:
 
 
 TORQUES = ("a", "b", "Ia", "Fs", "Fv", "Fst", "Fo")  # Parameters that scale together where no known load sets the scale
-
 OTHER_SCALE = 1.5  # Factor on the torque per volt
 
 MIN_RISE = 16.0
@@ -177,9 +176,7 @@ part counts as one observation. Simulated joints whose scale was wrong had 0 to 
 the public bench had 5 to 31 from single runs, 23 from a hundred."""
 
 SIGMAS = 2.0  # Standard errors that a range of the common factor has
-
 LEAST_RISE = 0.01  # Rise below which nothing is known of the factor: it is then stated as 1/60 to 60
-
 UNEXPLAINED = 0.2  # Typical residual, as a share of the range of the motion, from which on a fit explains nothing
 
 

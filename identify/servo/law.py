@@ -8,9 +8,7 @@ import numpy as np
 from idbench.identify.errors import SettingError, require_positive
 
 EXACT = 2**24  # Counts a turn from which on rounding is below that of the numbers in a log
-
 FREE = ("kind", "kp", "kd", "time_constant", "steps")  # What need not be above zero
-
 HIGHEST = 1500.0  # Supply [V] above which millivolts are suspected: low voltage (IEC 61140) ends there for direct current
 
 

@@ -35,11 +35,8 @@ REMAINING = 0.01
 """Residual, as a share of the range of the motion, that may be left with a mistake: beyond, something else is wrong."""
 
 GLANCES = 5  # Rounds of a search that tells which mistakes are likely
-
 LIKELY = 3  # Mistakes that are searched for further
-
 ROUNDS = 25  # Rounds of these: of a gain that is half of what it is, the first five led elsewhere
-
 AS_WELL = 0.8  # Share of what the best mistake explains from which on another one is named beside it
 
 

@@ -58,9 +58,7 @@ DELAYS = np.array([*np.arange(0.0, 0.0601, 0.005), 0.08, 0.1, 0.13, 0.16, 0.2, 0
 """Delays of the command that are tried [s]."""
 
 RATES = 10  # Rate limits that are tried, between half and 1.3 times the largest speed of a joint, beside none
-
 DECIMATION = max(1, int(0.25 / CUTOFF))  # rows at twice the rate that the band of the smoothing needs
-
 LIGHTEST = 1e-6  # Inertia of a rotor of which rows show none, per torque: a search in shares of it could not leave zero
 
 COLUMNS = ("a", "b", "Ia", "Fs", "offset")

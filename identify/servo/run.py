@@ -86,9 +86,7 @@ class JointLoad:
 
 
 MIN_SAMPLES = 20  # Samples that a run must have
-
 SPIKE = 5.0  # Times the longest way of the joint in a sample: a position that is further from those about it was not read well
-
 BESIDE = 5  # Samples whose median a position is compared with
 
 

@@ -17,22 +17,16 @@ from idbench.identify.servo.closed_loop import STATES, ServoLoop
 from idbench.identify.servo.parameters import SERVO_PARAMETERS, limits_of, step_of
 
 DAMPINGS = 10.0 ** np.arange(-2.0, 4.0)  # Marquardt's parameter, as multiples of the last one that helped
-
 SAMPLES = 12  # Samples a round, in pairs
-
 SETTLED = 3e-4  # Share by which the best of a round must improve the objective
-
 MEDIAN = float(ndtri(0.75))  # Median of the size of a normal number, in standard deviations
-
 IDLE = 2  # Rounds without such an improvement after which a search ends
 
 WORST, RISES = 2, (0.1, 0.4, 1.6)
 """Axes along which other valleys are looked for, and shares by which the objective would grow on the way."""
 
 UNSEEN = 1e-6  # Curvature of an axis, of those scaled to 1, up to which nothing shows along it
-
 AHEAD = 3.0  # Counts by which the beginning of a run may be off
-
 WILD = 4.0  # Times its typical size from which on the sensitivity of a sample counts less: of motions that depend on a hair
 
 

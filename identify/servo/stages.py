@@ -18,21 +18,13 @@ from idbench.identify.servo.valleys import Valleys
 from idbench.identify.telling import one_thread
 
 TRIED = 48  # Starts of the rows that are simulated
-
 FEW = 20  # Runs of which all are looked at from the beginning, in pieces that are simulated side by side; many are whole
-
 MOST_RUNS = 120  # Runs that a search looks at; of more, as many evenly spread ones
-
 COARSE = 0.4  # Longest step of the first stages, as a share of the sampling time
-
 MEDIUM = 0.2  # Longest step of the last stage with whole runs
-
 FINE = 0.1  # Longest step of the last stage with pieces
-
 MISLED = 0.2  # Mean residual of a start, over the range of the motion, from which on commands are tried with the other sign
-
 STEP = 1e-3  # Shortest step of the last stage [s]: a tenth of the sampling time of 100 Hz, at which the benches were identified
-
 PLAYS = np.array([0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0])  # Backlash that is tried first [counts]
 
 

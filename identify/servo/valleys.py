@@ -12,19 +12,12 @@ from idbench.identify.servo.fit import OTHER_SCALE, TORQUES
 from idbench.identify.servo.search import SETTLED, Found, ServoSearch
 
 SHAKEN = 2  # Times that a search leaves its valley for others, at most
-
 SCALES = (0.7, 1.0, 1.4)  # Factors on all torques that are tried from there
-
 ROTORS = (0.25, 1.0, 4.0)  # Further factors on the armature that are tried
-
 LATER = (-2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0)  # Changes of the delay that are tried [samples]
-
 VALLEYS = 3  # Other valleys that are searched
-
 ESCAPED = 0.01  # Share by which another valley must be better
-
 ASIDE = 8  # Rounds in another valley of the last stage, at most
-
 NEAR = 1.1, 1.03  # Factors on all torques by which the last stage goes along the valley
 
 NARROW = 3.0

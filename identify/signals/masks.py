@@ -9,17 +9,18 @@ import numpy as np
 import scipy
 
 from idbench.identify.arrays import Array
+from idbench.identify.data.jumps import velocity_noise
 from idbench.identify.errors import SettingError, require_not_negative, require_positive
 from idbench.identify.plugins import Table
-from idbench.identify.signals.prefilters import NOISY, SLOW, velocity_noise
 
 
 class AbstractMask(ABC):
     """Weights of the instants: both sides of a model are multiplied by them before the operator."""
 
-    @abstractmethod
     def halo(self, fs: float) -> float:
-        """Return how far [s] a weight looks to either side."""
+        """How far a weight looks to either side [s]; 0 by default."""
+        del fs
+        return 0.0
 
     def suited(self, qd: Array) -> "AbstractMask":
         """Return the mask with settings that follow a motion, velocities of shape (..., joint, time); itself by default."""
@@ -36,22 +37,18 @@ class AbstractMask(ABC):
 class NoMask(AbstractMask):
     """Keeps every instant."""
 
-    def halo(self, fs: float) -> float:
-        """Return 0."""
-        del fs
-        return 0.0
-
     def weight(self, qd: Array, fs: float) -> Array:
         """Return ones."""
         del fs
         return np.ones_like(qd)
 
 
+SLOW = 0.05  # Share of a joint's rms speed up to which it counts as turning: 0.1 rad/s of the SCARA's 2 rad/s
+NOISY = 4.0  # Standard deviations of the noise of velocities up to which their sign is not known
 MIN_SPEED = 1e-12  # Speed below which there is none
 
 WIDE = (1.0, 10 / 3)
-"""Width and taper of a wide mask, in tapers of a short one: 30 and 100 ms of 30 ms. Differences look 30 ms across a kink; edges
-of 100 ms keep the noise of encoder counts out of the band without a prefilter."""
+"""Width and taper of a wide mask, in tapers of a short one: 30 and 100 ms. Differences look 30 ms across a kink."""
 
 
 def slow_speed(qd: Array) -> Array:
@@ -87,14 +84,12 @@ class ReversalMask(AbstractMask):
     def __post_init__(self) -> None:
         for value in () if self.threshold is None else np.ravel(self.threshold):
             require_positive(threshold=float(value))
-        require_not_negative(width=self.width, taper=self.taper)
-        for value in self.reach:
-            require_not_negative(reach=value)
+        require_not_negative(width=self.width, taper=self.taper, reach=min(self.reach, default=0.0))
 
     def halo(self, fs: float) -> float:
         """Return the width, the taper, and the sample next to them."""
         edges = [(self.width, self.taper), *([self._wide] if any(self.reach) else [])]
-        return max((_samples(width, fs) + 2 * _half(taper, fs) + 1) / fs for width, taper in edges)
+        return max((_samples(width * fs) + 2 * round(taper * fs / 2) + 1) / fs for width, taper in edges)
 
     def suited(self, qd: Array) -> Self:
         """Return this mask with the slow speeds of a motion, where nothing else is said."""
@@ -103,9 +98,9 @@ class ReversalMask(AbstractMask):
     def weight(self, qd: Array, fs: float) -> Array:
         """Return 1 where the joint moves, 0 where it rests or reverses, and what is between near there."""
         slow, edges = self._slow(qd), (self.width, self.taper)
+        reach = np.array(self.reach)
         weight = _weight(qd, slow, edges, fs)
-        if any(self.reach):
-            reach = np.array(self.reach)
+        if reach.any():
             weight = np.where(reach[:, None] > 0, _weight(qd, slow * np.maximum(reach, 1.0), self._wide, fs), weight)
         for coupling in self.couplings:
             turns = np.array(coupling)[:, None]
@@ -133,24 +128,17 @@ def _weight(qd: Array, slow: Array, edges: tuple[float, float], fs: float) -> Ar
     turns = np.signbit(qd[..., 1:]) != np.signbit(qd[..., :-1])  # a fast joint turns between two samples
     slides[..., 1:] &= ~turns
     slides[..., :-1] &= ~turns
-    half = _half(edges[1], fs)
-    wide = _eroded(slides.astype(np.float64), _samples(edges[0], fs) + half)
+    half = round(edges[1] * fs / 2)
+    reach = 2 * (_samples(edges[0] * fs) + half) + 1
+    wide = scipy.ndimage.minimum_filter1d(slides.astype(np.float64), reach, axis=-1, mode="nearest")
     rise = np.hanning(2 * half + 3)[1:-1]
     smooth = scipy.ndimage.convolve1d(wide, rise / rise.sum(), axis=-1, mode="nearest")
     # Sums of the weights leave some 1e-17 where all are zero, or not quite 1 where all are one.
     return np.where(smooth < 1e-12, 0.0, np.minimum(smooth, 1.0))
 
 
-def _samples(width: float, fs: float) -> int:
-    return ceil(width * fs - 1e-9)  # 0.03 s at 100 Hz are 3 samples, whatever the rounding of the product
-
-
-def _half(taper: float, fs: float) -> int:
-    return round(taper * fs / 2)
-
-
-def _eroded(weight: Array, reach: int) -> Array:
-    return scipy.ndimage.minimum_filter1d(weight, 2 * reach + 1, axis=-1, mode="nearest")
+def _samples(width: float) -> int:
+    return ceil(width - 1e-9)  # 0.03 s at 100 Hz are 3 samples, whatever the rounding of the product
 
 
 MASKS: Table[AbstractMask] = Table(

@@ -7,9 +7,7 @@ import scipy
 from idbench.identify.arrays import Array
 
 WILD = 6.0  # Standard deviations, from a quantile of the absolute differences, beyond which a sample is wild
-
 REACH = 2  # Samples to either side from which the one between them is interpolated, by a cubic
-
 PASSES = 50  # Times at most that wild samples are sought: neighbours of one look wild until it is replaced
 
 SHARE, SIGMA = 0.8, 1 / 1.2816

@@ -9,11 +9,8 @@ from idbench.sim.robot.robot import Robot
 from idbench.sim.trajectories import Reference
 
 TURN = 2 * np.pi  # How far [rad] a hinge without range may be from where its motion goes: one turn
-
 FAR = 1.0  # How far [m] a slide without range may be from where its motion goes, or as far as the motion goes, if that is more
-
 FAST = 10.0  # Speed, as a multiple of the largest that the motion asks of a joint, that no loop at work reaches
-
 MIN_SPEED = 1.0  # Speed [rad/s, m/s] that counts as the motion's where it asks for less: joints at rest are pushed by others
 
 ADVICE = (

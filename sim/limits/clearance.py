@@ -13,11 +13,8 @@ from idbench.sim.robot.robot import Robot
 from idbench.sim.robot.scene import body_name
 
 ALWAYS = 100  # Random postures: pairs that are too near in all of them are made so, and are left out
-
 SEED = 0  # Of the random postures: the same for everybody
-
 ROOM = 0.02  # Distance [m] beyond the least from which on nearness costs, where a pair can get so far apart
-
 COARSE = 50.0  # Frequency [Hz] at which distances are taken first; between two of its instants, speeds say what can happen
 
 

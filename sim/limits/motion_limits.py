@@ -22,11 +22,8 @@ RATES = ("velocity", "acceleration", "jerk")
 """Limits that MJCF has no word for: a robot's file gives them as `<custom><numeric name="max_velocity" data="..."/>`."""
 
 DEGREES = 5.0  # Times the range of a file beyond which one that is asked for is taken for degrees
-
 FLOOR = "the floor"  # What the floor is called beside the shapes of a file
-
 CLEARANCE = 0.01  # Least distance between shapes by default [m]; pairs that never get so far apart are made so
-
 BOX = "keep_out {}"  # What a box is called beside them
 
 

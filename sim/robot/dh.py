@@ -18,14 +18,12 @@ KHALIL, CLASSIC = "khalil-kleinfinger", "classic"
 
 KNOWN = ("name", "convention", "angles", "gravity", "joints")
 OF_JOINTS = ("name", "sigma", "alpha", "d", "theta", "range", "armature")  # Keys of a file, and of each of its joints
-
 OF_CONVENTION = {KHALIL: ("parent", "gamma", "b", "r"), CLASSIC: ("a",)}  # And those that a convention has beside them
 
 FARTHEST, STRONGEST = 1e6, 1e3
 """Lengths, angles and armatures, and accelerations of gravity [m/s^2], beyond which nothing of a robot lies."""
 
 EXAMPLES = {2: "[-2.4, 2.4]", 3: "[0.0, 0.0, -9.81]"}  # Lists of so many numbers
-
 RIGHT = 1e-5  # Angles [rad] this near to a multiple of a right angle are meant to be it: 1.5708
 
 

@@ -82,7 +82,6 @@ def with_values(values: Mapping[str, float | None]) -> Callable[[mujoco.MjSpec],
 
 
 MIN_FACTOR, MAX_FACTOR = 1e-6, 1e6  # Sizes of a coupling's factors beyond which they are slips
-
 PLAIN = Mounting()  # As the file describes it
 
 

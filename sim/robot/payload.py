@@ -39,7 +39,6 @@ def without_missing_meshes(spec: mujoco.MjSpec, folder: Path) -> list[str]:
 
 
 HARD = (0.95, 0.999, 1e-4, 0.5, 2.0)  # MuJoCo's solimp of the ends: hard from 0.1 mrad on
-
 LOCKED = 1e-9  # Play of a joint that has none [rad]
 
 

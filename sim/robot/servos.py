@@ -29,7 +29,6 @@ NO_DRIVE = ("armature", "damping", "frictionloss", "stiffness", "margin", "ref",
 """What a joint that is free play has none of, whatever the defaults of the file are."""
 
 GROUPS = 31  # Groups of actuators that MuJoCo can disable
-
 PLAY = "_play"  # What the name of a joint's free play ends with
 
 SHARP_FRICTION = (1e-4, 1.0), (0.9999, 0.9999, 0.001, 0.5, 2.0)

@@ -12,9 +12,7 @@ from idbench.sim.errors import RobotError
 from idbench.sim.robot.motors import Array
 
 SMALL = 1e-3  # Mass [kg] of a moving link to which its file gives none: identification needs its place alone
-
 SIZE = 0.05  # Radius of gyration [m] of links whose inertia is made up
-
 TINY = 1e-12  # Second moment [kg m^2] below which MuJoCo takes it for none
 
 ROTOR_INERTIA, GEAR_RATIO = "drake:rotor_inertia", "drake:gear_ratio"

@@ -11,7 +11,6 @@ from idbench.sim.robot.robot import Robot
 from idbench.sim.robot.urdf import GEAR_RATIO, ROTOR_INERTIA, parsed
 
 UNLIMITED = 1e6  # What stands for no limit, where a URDF must have one
-
 DRAKE = "http://drake.mit.edu"  # Namespace of the elements that Drake reads
 
 

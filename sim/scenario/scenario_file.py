@@ -19,7 +19,6 @@ from idbench.sim.settings import description, for_all_joints, limits, make
 from idbench.sim.trajectories import TRAJECTORIES
 
 LONGEST = 1500  # Letters from which on a table comes after the others
-
 LONG = 60  # Characters beyond which a value stands on lines of its own
 
 FOLDER = Path(__file__).parent / "scenarios"

@@ -11,7 +11,6 @@ from idbench.sim.robot.motors import Array
 from idbench.sim.trajectories.trajectory import AbstractMotion, Reference
 
 PEAK_VELOCITY = 15 / 8  # Largest |ds/du| of s(u) = 10 u^3 - 15 u^4 + 6 u^5, at u = 1/2
-
 PEAK_ACCELERATION = 10 / np.sqrt(3)  # Largest |d2s/du2| of s(u), at u = 1/2 - 1/sqrt(12)
 
 

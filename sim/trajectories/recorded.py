@@ -16,11 +16,8 @@ from idbench.sim.settings import Positive, settings
 from idbench.sim.trajectories.trajectory import AbstractMotion, AbstractTrajectory, Reference
 
 DEGREE = 5  # Degree of the spline through positions: its acceleration is smooth, too
-
 ORDER = 4  # Order of the low-pass, which is applied forwards and backwards
-
 RESTS = 0.05  # Speed at an end, as a share of the largest of all joints, up to which a joint counts as at rest there
-
 EXAMPLE, EXAMPLES = Path(__file__).parent / "example.csv", 2  # A short motion of the SCARA, and its joints
 
 

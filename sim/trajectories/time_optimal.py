@@ -122,11 +122,8 @@ def _standing(point: Array) -> Array:
 
 
 VELOCITY = 1.0  # Largest speed of a gentle move [rad/s]
-
 ACCELERATION = 5.0  # Largest acceleration of a gentle move [rad/s^2]
-
 JERK = 50.0  # Largest jerk of a gentle move [rad/s^3]
-
 REST = 0.2  # Time at rest before and after it [s]
 
 

@@ -46,7 +46,6 @@ class AbstractMotion(ABC):
 
 
 MOST_SAMPLES = 1e8  # Samples of a joint above which a motion is taken for a slip: 0.8 GB
-
 LONGEST = 1e6  # Duration [s] above which a motion is taken for a slip: eleven days
 
 

@@ -5,7 +5,7 @@ import pytest
 
 from idbench.identify import NoMask, NoPrefilter, ReversalMask, SettingError, idbench_chain
 from idbench.identify.signals.masks import slow_speed
-from idbench.identify.signals.prefilters import FirPrefilter, NoisePrefilter
+from idbench.identify.signals.prefilters import NoisePrefilter
 
 
 @pytest.mark.parametrize("fs", [100.0, 1000.0])
@@ -79,7 +79,7 @@ def test_positions_are_filtered_where_they_are_noisy_and_only_there(log):
     counts = 2 * np.pi / 2**16
     noisy = replace(log, q=counts * np.round(log.q / counts))
     chain = idbench_chain()
-    assert chain.suited_prefilter(noisy) == FirPrefilter(15.0)
+    assert chain.suited_prefilter(noisy) == NoisePrefilter(15.0, 0.0)
     assert chain.suited_prefilter(log) == NoPrefilter()
     high = NoisePrefilter(60.0)
     np.testing.assert_array_equal(high.apply(log.q.T, log.fs), log.q.T)

@@ -22,11 +22,8 @@ if TYPE_CHECKING:
     from idbench.experiments.recording.motion_layer import Base
 
 EVERY = 0.25  # Time between two looks at the file [s]
-
 REST = 3.0  # Rest after a look, as a multiple of what it took: the work stays a quarter of a processor's, however long the log
-
 FEW = 20  # Lines up to which a log that cannot be read has only just begun
-
 KNOWN = 10.0  # %sigma up to which a parameter counts as known
 
 

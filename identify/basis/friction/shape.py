@@ -14,7 +14,6 @@ from idbench.identify.basis.joint_law import AbstractFriction, AbstractJointLaw
 from idbench.identify.signals.signals import State
 
 STEP = 1e-4  # Of central differences by the logarithm of a shape
-
 FACTOR = 2.0  # By which a shape changes at most from one round to the next: the slope there says little of what is farther away
 
 

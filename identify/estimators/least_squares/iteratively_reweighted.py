@@ -24,7 +24,6 @@ ROUGH_Q, ROUGH_TAU = 1e-5, 1e-3
 """How rough positions and torques are at least, as a share of their standard deviation: torques bend, positions hardly."""
 
 MIN_DEVIATION = 0.1  # Standard deviation of a row at least, over the median of its kind: of the edge of a mask little is known
-
 SETTLED = 1e-3  # Step, in sigma of the paper's formula, below which parameters count as settled
 
 

@@ -17,9 +17,7 @@ EXACT = 1e-9
 """Share of its squares below which noise of a combination of columns counts as none: it is exact, as that of an offset."""
 
 APART = 2.0  # Ratio by which the squared singular values of W must exceed the least of [W Y], both over their noise
-
 ROUNDING = 1e-15  # Share of the trace of a covariance that is added to its diagonal
-
 FLOOR = 1e-9  # Standard deviation of noise [rad] that counts as none
 
 

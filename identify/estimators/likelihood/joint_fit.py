@@ -41,13 +41,9 @@ CHECK = "check order and delay of the torques, and whether they were filtered, o
 """What helps where torques and motion do not go together."""
 
 UNKNOWN = 5.0  # Noise of the torque where friction's sign is not known, over the jump of friction there
-
 TURNING = 0.3  # Half the difference of two torques near a reversal, over the level of their mean there
-
 START = 0.1  # Level of the torques near reversals to begin with, over the jump of friction there
-
 NEAR = 5.0  # How far velocities may then be from differences of the positions, over what noise and accelerations make of these
-
 MASK = ReversalMask(width=0.02, taper=0.02)  # Where the sign of a velocity is no model of friction
 
 

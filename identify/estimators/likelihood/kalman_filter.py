@@ -26,7 +26,6 @@ ALPHA, BETA = 0.1, 2.0
 nonlinear estimation", Proc. IEEE AS-SPCC 2000, 153-158)."""
 
 TUNINGS = 1.0, 3.0, 10.0  # Process noise that is tried, over the torque noise of the log
-
 MIN_NOISE = 1e-7  # Noise of positions [rad] and torques [N m] at least: of exact ones covariances would be those of rounding
 
 UNSURE = 10.0

@@ -107,16 +107,13 @@ takes one 7 sigma far. Where torques do not belong to the motion, parameters of 
 any."""
 
 APART = 3.0  # The same where its own sigma is below the share `SMALL` of that estimate's
-
 SMALL = 1e-2  # Share of sigma below which a fit claims to know far more than the estimate that it began with
 
 NOTHING = 0.9
 """Share of the rms torque above which noise that is found leaves nothing to the motion: less than a fifth of its square."""
 
 FINE = 0.02  # Change of the sigmas from one set of levels to the next at which reversals are used up: they come slowly
-
 WORTH = 0.9  # Typical sigma, over that of a fit without reversals, below which these are used
-
 MAX_BYTES = 2e9  # Bytes that the equations of all motions may take
 
 

@@ -19,7 +19,6 @@ Solved = tuple[Array, Array, Array]
 """L^-1 A_zX, L^-1 b_nodes, and the factor L of A_zz in bands."""
 
 CHUNK = 4000  # Cells whose columns are made at once: those of all would take too much memory
-
 RATE = 50.0  # Frequency [Hz] at which the torques' slopes are computed; between they are interpolated
 
 

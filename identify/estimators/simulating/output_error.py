@@ -18,7 +18,6 @@ from idbench.identify.estimators.simulator import AbstractPlant
 from idbench.identify.nuisances import Nuisances
 
 STEP_Q, STEP_QD = 1e-5, 1e-4  # Changes of a state at the beginning of a segment [rad, rad/s]
-
 LOST = 0.5  # Share of segments that may fail
 
 

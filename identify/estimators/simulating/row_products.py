@@ -10,7 +10,6 @@ from idbench.identify.arrays import Array
 from idbench.identify.estimators.problem import Problem
 
 WORST = 1e-12  # Reciprocal condition number of Z' W, its rows and columns scaled to length 1, below which it counts as singular
-
 ROUNDS = 2  # How often weights are taken from the residuals of the solution before
 
 
