@@ -26,6 +26,7 @@ from idbench.experiments.paper.motions import Table1Motions
 from idbench.experiments.paper.table1 import PAPER
 from idbench.experiments.recording import columns
 from idbench.experiments.recording.viewers import LOOPBACK
+from idbench.experiments.reports import uncertainty
 from idbench.experiments.servo.device import device_of
 from idbench.experiments.study import statistics
 from idbench.experiments.study.study_file import load_study
@@ -33,19 +34,29 @@ from idbench.identify import CHAINS, ESTIMATORS
 from idbench.identify.basis.friction import smooth
 from idbench.identify.data import clock
 from idbench.identify.data.kinematics import INERTIAL
-from idbench.identify.estimators import model_error
+from idbench.identify.estimators import leave_out
 from idbench.identify.estimators.likelihood import maximum_likelihood
-from idbench.identify.judge import band, delay, friction_choice, held_out, small_mistakes, torque_interval, validation
+from idbench.identify.judge import (
+    delay,
+    friction_choice,
+    held_out,
+    mask_choice,
+    small_mistakes,
+    torque_interval,
+    used_rows,
+    validation,
+)
 from idbench.identify.loads import drive_gains, payload
 from idbench.identify.models import THREE
-from idbench.identify.noise import noisy_rows, white_noise
+from idbench.identify.noise import white_noise
 from idbench.identify.rows import factors, rows
 from idbench.identify.rows.chain import paper_chain
-from idbench.identify.rows.operators import FirLowPass, ModulatingFunctions, Windows
+from idbench.identify.rows.operators import FirLowPass, ModulatingFunctions, Windows, low_pass
 from idbench.identify.servo import fit as servo_fit
 from idbench.identify.servo import mistakes
 from idbench.identify.servo.law import PUBLISHED
 from idbench.identify.signals import filters, masks, wild_samples
+from idbench.identify.signals.prefilters import NoisePrefilter
 from idbench.sim.drives import SwitchedDrive
 from idbench.sim.encoders import IncrementalEncoder
 from idbench.sim.robot.robot import Robot
@@ -196,20 +207,24 @@ CLAIMS: list[tuple[str, str, Callable[[], object]]] = [
     ("identification.md", r"(\w+) chains ship", lambda: len(CHAINS.builtin)),
     ("identification.md", r"\*\*Its threshold\*\* is (\d+) % of each joint's rms speed", lambda: 100 * masks.SLOW),
     ("identification.md", r"or (\d+) times the noise of its velocity", lambda: masks.NOISY),
-    ("identification.md", r"\(an F test, ([\d.]+) times\)", lambda: band.EXCESS),
+    ("identification.md", r"falls by (\d) % or", lambda: 100 * mask_choice.SHARE),
+    ("identification.md", r"noise of ([\d.]+) % of their rms", lambda: 100 * NoisePrefilter().least),
+    ("identification.md", r"to a (\w+) of the rms speed, with edges", lambda: masks.SLOW * mask_choice.REACHES[-1]),
+    ("identification.md", r"Its edges are (\d+) ms long", lambda: 1000 * masks.ReversalMask().taper),
+    ("identification.md", r"with edges of (\d+) ms", lambda: 1000 * masks.WIDE[1] * masks.ReversalMask().taper),
+    ("noise.md", r"without a stretch of (\d) s", lambda: leave_out.STRETCH),
+    ("noise.md", r"Logs below (\d+) s have", lambda: uncertainty.ENOUGH),
+    ("results-noise.md", r"half width of a joint is ([\d.]+) times", lambda: torque_interval.OTHER_MOTION),
+    ("results-noise.md", r"rows of moving joints up to (\d+) Hz", lambda: used_rows.BAND),
     ("identification.md", r"singular values below (\S+) of the largest", lambda: factors.NOT_SHOWN),
-    ("identification.md", r"raised to a (\w+) of the rms speed at most", lambda: masks.SLOW * band.BANDS[-1]),
     ("identification.md", r"with \(1 - \(t/H\)²\)([⁰-⁹])", lambda: "⁰¹²³⁴⁵⁶⁷⁸⁹"[ModulatingFunctions().degree]),
     ("index.md", r"A delay of (\d+) ms in the log", lambda: 1e3 * load("delay").timing.delay),
     ("loads.md", r"chooses one of (\w+) ways", lambda: len(payload.WAYS)),
     ("loads.md", r"contradict by more than (\w+) sigma", lambda: known_load.SURE),
     ("loads.md", r"\(sigma above a (\w+) of it\)", lambda: drive_gains.VAGUE),
-    ("noise.md", r"Rows of which the mask leaves less than (\d+) % are dropped", lambda: 100 * noisy_rows.SEEN),
+    ("noise.md", r"Rows of which the mask leaves less than (\d+) % are dropped", lambda: 100 * low_pass.SEEN),
     ("noise.md", r"If a fit is (\d+) standard errors or more away from `GLS`", lambda: maximum_likelihood.FAR),
-    ("noise.md", r"autocorrelation\s+up to (\d) s", lambda: model_error.MEMORY),
     ("noise.md", r"Noise levels come from (six)th differences", lambda: white_noise.ORDER),
-    ("noise.md", r"A (\w+) of the largest effect", lambda: model_error.IN_PHASE),
-    ("noise.md", r"for one log (\d+) % of Fv", lambda: 100 * model_error.CHANGES["viscous friction"]),
     ("noise.md", r"would fall by less than a (\w+), it returns", lambda: 1 - maximum_likelihood.WORTH),
     ("questions.md", r"(\d+) parameters that a motion can identify", lambda: len(RobotModel("two_link").basis.names)),
     ("questions.md", r"identify` estimates these (\w+)\.", lambda: len(RobotModel("two_link").basis.names)),
@@ -275,7 +290,7 @@ CLAIMS: list[tuple[str, str, Callable[[], object]]] = [
     ("results-noise.md", r"is within a factor of ([\d.]+) of the bound", lambda: rounded(max(over_bound("GLS")[2:]))),
     ("results-noise.md", r"On Fourier series it is (\d) to", lambda: round(min(of_series()))),
     ("results-noise.md", r"On Fourier series it is \d to (\d) times the bound", lambda: round(max(of_series()))),
-    ("results-noise.md", r"with which stretches of (\d) s are predicted", lambda: torque_interval.BLOCK),
+    ("results-noise.md", r"with which stretches of (\d) s are predicted", lambda: leave_out.STRETCH),
     ("servo-accuracy.md", r"`study servo`: (\d+) s at", lambda: round(duration("servo"))),
     ("servo-accuracy.md", r"\d+ bits, (\d) ms of jitter", lambda: 1e3 * load("servo").timing.jitter),
     ("servo-accuracy.md", r"torque off (\w+) times; 100 logs", lambda: len(load("servo").drive.off)),

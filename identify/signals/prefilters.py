@@ -71,7 +71,7 @@ class ButterworthPrefilter(AbstractPrefilter):
 
     def halo(self, fs: float) -> float:
         """Return the settling time of one pass."""
-        return _halo(self, fs)
+        return settling_time(_sections(self, fs), fs)
 
     def apply(self, x: Array, fs: float) -> Array:
         """Return `x` filtered forward and backward."""
@@ -82,11 +82,6 @@ class ButterworthPrefilter(AbstractPrefilter):
 def _sections(f: ButterworthPrefilter, fs: float) -> Array:
     require_below_nyquist("prefilter cutoff", f.cutoff, fs)
     return frozen(scipy.signal.butter(f.order, f.cutoff, fs=fs, output="sos"))
-
-
-@lru_cache(maxsize=16)
-def _halo(f: ButterworthPrefilter, fs: float) -> float:
-    return settling_time(_sections(f, fs), fs)
 
 
 @final
