@@ -7,7 +7,7 @@ import numpy as np
 from idbench.identify.errors import LogError
 from idbench.identify.estimators.leave_out import Stretches
 from idbench.identify.estimators.problem import Problem
-from idbench.identify.judge.used_rows import UsedRows, squares_left_out
+from idbench.identify.judge.used_rows import UsedRows, errors_left_out
 from idbench.identify.signals.masks import ReversalMask
 
 REACHES = (2.0, 4.0)
@@ -15,8 +15,8 @@ REACHES = (2.0, 4.0)
 KR300 takes 4 in most joints; 1 was never best there, nor on UR10e, TX40 and Baxter."""
 
 SHARE = 0.05
-"""Share of a joint's squared error that a wide mask must take to be chosen: they take 10 to 85 % in five joints of a KR300, at
-most 3 % on a UR10e, a TX40 and a Baxter."""
+"""Share of a joint's mean absolute error that a wide mask must take to be chosen: it is 10 to 55 % in five joints of a KR300, at most
+2 % on a UR10e, a TX40 and a Baxter."""
 
 
 def suited_reach(problem: Problem) -> tuple[float, ...]:
@@ -25,21 +25,21 @@ def suited_reach(problem: Problem) -> tuple[float, ...]:
     Near reversals the friction of joints with strong stiction is not Fs sign(qd), and rows there spoil the rest; on slow robots
     they are the most informative of all. Each mask is judged by predictions of stretches that were left out, on all rows of
     moving joints, where the written function is used: a wide mask must predict them better than the short one.
-
+    Absolute errors count: no mask makes stiction itself predictable, and its squares would hide how well the rest is.
     """
     explicit, mask = problem.explicit, problem.chain.mask
     if not isinstance(mask, ReversalMask) or mask.threshold is not None or problem.logs[0].poses:
         return ()
     used, stretches = UsedRows.of(explicit), Stretches.of(explicit.parts)
-    best = squares_left_out(explicit, used, stretches)
+    best = errors_left_out(explicit, used, stretches)
     reach = np.zeros(problem.basis.n)
     for wide in REACHES:
         chain = replace(problem.chain, mask=replace(mask, reach=(wide,) * problem.basis.n))
         try:
-            squares = squares_left_out(replace(explicit, chain=chain, _signals=(), _explicit=None), used, stretches)
+            errors = errors_left_out(replace(explicit, chain=chain, _signals=(), _explicit=None), used, stretches)
         except LogError:  # a short log has no room for wider edges
             break
         for j in range(problem.basis.n):
-            if squares[:, j].sum() < (1 - SHARE) * best[:, j].sum():
-                best[:, j], reach[j] = squares[:, j], wide
+            if errors[j] < (1 - SHARE) * best[j]:
+                best[j], reach[j] = errors[j], wide
     return tuple(reach.tolist()) if reach.any() else ()

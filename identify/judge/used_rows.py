@@ -61,8 +61,8 @@ class UsedRows:
         )
 
 
-def squares_left_out(problem: Problem, used: Sequence[UsedRows], stretches: Stretches) -> Array:
-    """Squared errors of each joint on used rows of each stretch, predicted by a fit of the others, shape (stretch, joint).
+def errors_left_out(problem: Problem, used: Sequence[UsedRows], stretches: Stretches) -> Array:
+    """Sums of the absolute errors of each joint on used rows, those of each stretch predicted by a fit of the others, (joint,).
 
     By weighted least squares, whose weights are those of all rows.
     """
@@ -70,8 +70,4 @@ def squares_left_out(problem: Problem, used: Sequence[UsedRows], stretches: Stre
     weight = problem.explicit.factors.fit(2).weight
     rows = [part.rows.joined * np.tile(weight, part.rows.maps[0].grid.count)[:, None] for part in parts]
     X = left_out(stretches.products(parts, rows))
-    found = np.zeros((stretches.count, problem.basis.n))
-    for k, one in enumerate(used):
-        at = stretches.at(k, one.time)
-        np.add.at(found, at, one.errors(X[at]) ** 2)
-    return found
+    return np.sum([np.sum(np.abs(one.errors(X[stretches.at(k, one.time)])), axis=0) for k, one in enumerate(used)], axis=0)

@@ -1,0 +1,139 @@
+"""One notion of a row that counts: what it does not determine is left out or refused, and no estimate is NaN."""
+
+import importlib.util
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from idbench.identify import (
+    ESTIMATORS,
+    BaseParameters,
+    ExplicitModel,
+    IdentificationError,
+    MotionLog,
+    Problem,
+    ReversalMask,
+    TorqueChannel,
+    idbench_chain,
+    identify,
+    scara,
+)
+from idbench.identify.basis import tree_basis
+from idbench.identify.judge.delay import estimate_delay
+from idbench.identify.judge.mask_choice import suited_reach
+
+spec = importlib.util.spec_from_file_location("fault_logs", Path(__file__).parent / "fault_logs.py")
+assert spec is not None
+assert spec.loader is not None
+logs = sys.modules.setdefault("fault_logs", importlib.util.module_from_spec(spec))
+spec.loader.exec_module(logs)
+
+ALONE = [name for name in ESTIMATORS.builtin if not {"loop", "plant"} & ESTIMATORS.create(name).needs]
+
+
+def at_rest(log):
+    q = log.q.copy()
+    q[:, 1] = 0.3
+    return [replace(log, q=q)], idbench_chain()
+
+
+def all_masked(log):
+    return [log], replace(idbench_chain(), mask=ReversalMask((0.1, 100.0)))
+
+
+def edges_alone(log):
+    """Of joint 2 the edges of some stretches are left."""
+    fastest = float(np.abs(np.gradient(log.q[:, 1], 1 / log.fs)).max())
+    return [log], replace(idbench_chain(), mask=ReversalMask((0.1, 0.99 * fastest), 0.03, 0.1))
+
+
+def duplicates(log):
+    return [log, log], idbench_chain()
+
+
+def one_too_few(log):
+    chain = idbench_chain()
+    samples = 2 * int(np.ceil(chain.margin(log) * log.fs - 1e-9)) + chain.operator.step(log.fs) - 1
+    return [log.part(500, 500 + samples)], chain
+
+
+@pytest.mark.parametrize("case", [at_rest, all_masked, edges_alone, duplicates, one_too_few])
+@pytest.mark.parametrize("name", ALONE)
+def test_no_estimate_is_nan(name, case, log):
+    """Of a noise-free log: an estimate is finite, with finite standard errors, or it is refused by name."""
+    given, chain = case(log)
+    try:
+        found = identify(given, scara(), ExplicitModel(), chain, ESTIMATORS.create(name))
+    except IdentificationError as error:
+        outcome = str(error)
+    else:
+        outcome = "finite" if np.isfinite([found.X, found.standard_errors]).all() else "NaN"
+    assert "NaN" not in outcome
+
+
+def test_rank_is_judged_on_the_rows_that_are_solved(log):
+    """Rows of the edge of a mask alone count for neither."""
+    rows = Problem((log,), scara(), ExplicitModel(), edges_alone(log)[1])
+    (part,) = rows.parts
+    np.testing.assert_array_equal(part.noisy.kept, part.rows.valid)
+
+
+def slow_arm(seed, noise=4.8e-4):
+    """A log of a slow seven-joint arm whose positions jitter; joint 3 hardly moves."""
+    lab = logs.Lab("panda", seed, 0.02, np.array([0.0, 0.0, -9.81]), speed=0.5)
+    size = np.array([0.5, 0.5, 0.1, 0.5, 0.5, 0.5, 0.5])[:, None]
+    middle = lab.q.mean(axis=1, keepdims=True)
+    lab.q, lab.qd, lab.qdd = middle + size * (lab.q - middle), size * lab.qd, size * lab.qdd
+    told = logs.plain(lab)
+    level = np.sqrt(np.mean(told.tau**2, axis=1, keepdims=True))
+    tau = told.tau + 0.02 * level * lab.rng.standard_normal(told.tau.shape)
+    q = told.q + noise * lab.rng.standard_normal(told.q.shape)
+    return MotionLog(told.fs, q.T, tau.T, TorqueChannel("instantaneous")), BaseParameters.of(
+        told.tree, tree_basis(told.tree)
+    ).basis
+
+
+def test_a_slow_joint_with_noisy_positions_keeps_its_rows():
+    """Velocities have noise of 0.05 rad/s, as large as they are themselves: masks found from them would leave nothing."""
+    log, basis = slow_arm(0)
+    problem = Problem((log,), basis, ExplicitModel(), idbench_chain())
+    rows = problem.rows
+    assert rows.by_kind(rows.valid).mean(axis=1).min() > 0.4
+    found = ESTIMATORS.create("GLS").fit(problem)
+    assert np.isfinite(found.standard_errors).all()
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("late", [0.00016, 0.0033])
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_delay_is_found_to_60_microseconds(seed, late):
+    """A six-joint arm with counts of 17 bits and 0.3 % of torque noise, whose torques are logged late."""
+    lab = logs.Lab("puma560", seed, 0.3, np.array([0.0, 0.0, -9.81]))
+    told = logs.plain(lab)
+    told.tau = np.stack([np.interp(lab.t - late, lab.t, x) for x in told.tau])
+    log = logs.finished(lab, told)
+    found = estimate_delay(log, BaseParameters.of(told.tree, tree_basis(told.tree)).basis)
+    assert abs(found.delay + late) < 6e-5
+    assert abs(found.delay + late) < 3 * found.doubt
+
+
+def stiction(log, size, rng):
+    """Return a log whose joint 2 sticks: of another size after each reversal, in multiples of its Coulomb friction."""
+    qd = np.gradient(log.q[:, 1], 1 / log.fs)
+    after = np.cumsum(np.diff(np.sign(qd), prepend=0) != 0)
+    tau = log.tau.copy()
+    tau[:, 1] += 0.1 * size * rng.standard_normal(after.max() + 1)[after] * (np.abs(qd) < 0.15 * np.sqrt(np.mean(qd**2)))
+    return replace(log, tau=tau)
+
+
+def test_stiction_gets_a_wide_mask_and_coulomb_friction_does_not(log, rng):
+    noisy = replace(log, tau=log.tau + [0.05, 0.01] * rng.standard_normal(log.tau.shape))
+
+    def reach(one):
+        return suited_reach(Problem((one,), scara(), ExplicitModel(), idbench_chain()))
+
+    assert reach(noisy) == ()
+    assert reach(stiction(noisy, 20.0, rng))[1] > 0
