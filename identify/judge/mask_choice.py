@@ -15,8 +15,8 @@ REACHES = (2.0, 4.0)
 KR300 takes 4 in most joints; 1 was never best there, nor on UR10e, TX40 and Baxter."""
 
 SHARE = 0.05
-"""Share of a joint's mean absolute error that a wide mask must take to be chosen: it is 10 to 55 % in five joints of a KR300, at most
-2 % on a UR10e, a TX40 and a Baxter."""
+"""Share of a joint's mean absolute error that a wide mask must take to be chosen: it takes 10 to 55 % in five joints of a
+KR300, at most 2 % on a UR10e, a TX40 and a Baxter."""
 
 
 def suited_reach(problem: Problem) -> tuple[float, ...]:

