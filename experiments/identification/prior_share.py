@@ -33,7 +33,7 @@ def _error(request: Request, products: Array, R: Array, share: float) -> float:
     """Sum of squared errors of the stretches, with a share."""
     prior = request.robot_model.prior(share)
     assert prior is not None
-    X = left_out(products, prior_rows(prior, R, np.ones(()))[()])[:-1]
+    X = left_out(products, prior_rows(prior, R, np.ones(())))[:-1]
     x = np.concatenate([X, -np.ones((len(X), 1))], axis=1)
     total = float(np.einsum("bi,bij,bj->", x, products, x))
     return total if np.isfinite(total) else np.inf

@@ -104,7 +104,7 @@ class TrajectorySearch:
         for model, target in PAPER_CONDITION.items():
             rows = problem.with_model(model).rows
             share = np.abs(np.log(rows.factors.together.condition_number / target))
-            (to_rows,) = rows.maps
+            (to_rows,) = rows.maps  # every row must have an instant that is not masked, however little that is
             reach = ceil(problem.own_chain.operator.halo(log.fs) * log.fs - 1e-9)
             seen = Kernel(np.ones(2 * reach + 1), reach, to_rows.grid).apply(to_rows.inside)
             worst = np.maximum(worst, np.where((seen > 0).all(axis=(-2, -1)), share, inf))

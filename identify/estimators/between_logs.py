@@ -51,7 +51,12 @@ def between_logs(parts: Sequence[LogRows], solution: OfWeightedRows | OfWhitened
         C.append(np.diagonal(noise + ModelError.of([part], X[-1], [alone], 1.0, np.diagonal(noise)).covariance))
     if len(X) < 2:
         return None
-    x, w = np.array(X), 1 / np.maximum(C, TINY)
+    return BetweenLogs(scatter(np.array(X), np.array(C))[1], len(X))
+
+
+def scatter(x: Array, C: Array) -> tuple[Array, Array]:
+    """Q and tau^2 (see `between_logs`) of estimates x with variances C, shape (k, ...) each, shape (...) each."""
+    w = 1 / np.maximum(C, TINY)
     whole = w.sum(axis=0)
     Q = np.sum(w * (x - np.sum(w * x, axis=0) / whole) ** 2, axis=0)
-    return BetweenLogs(np.maximum(Q - (len(X) - 1), 0.0) / np.maximum(whole - np.sum(w**2, axis=0) / whole, TINY), len(X))
+    return Q, np.maximum(Q - (len(x) - 1), 0.0) / np.maximum(whole - np.sum(w**2, axis=0) / whole, TINY)

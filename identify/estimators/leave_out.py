@@ -80,6 +80,16 @@ def left_out(products: Array, known: Array | None = None) -> Array:
     return solved(np.concatenate([every - products, every[None]]), every)
 
 
+def jackknife(without: Array) -> Array:
+    """Covariance of an estimate from B estimates without a stretch each, shape (stretch, ..., p), shape (..., p, p):
+
+    J = (B - 1) / B sum over b of (X_b - mean) (X_b - mean)'
+    """
+    count = len(without)
+    off = np.moveaxis(without - without.mean(axis=0), 0, -1)
+    return np.asarray(np.matmul(off, np.swapaxes(off, -1, -2)) * ((count - 1) / count))
+
+
 def moved(parts: Sequence[LogRows], X: Array, influence: Sequence[Array]) -> Array:
     """X_b - X of any estimate X = G' Y, which is `left_out` of rows made independent:
 

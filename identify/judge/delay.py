@@ -10,6 +10,7 @@ from idbench.identify.arrays import Array
 from idbench.identify.basis.basis import Basis
 from idbench.identify.data.motion_log import MotionLog, TorqueChannel
 from idbench.identify.errors import ExcitationError, LogError, RangeError, SettingError
+from idbench.identify.estimators.between_logs import scatter
 from idbench.identify.estimators.problem import Problem
 from idbench.identify.judge.delay_step import delay_step, newton
 from idbench.identify.minimum import minimum
@@ -201,14 +202,10 @@ def _with_scatter(problem: Problem, found: DelayEstimate) -> DelayEstimate:
     own = [np.pad(D, [(0, 0), (k, len(slopes) - 1 - k)]) for k, D in enumerate(slopes)]
     step, sigma = delay_step(problem, own)
     shown = sigma > 0
-    w, freedom = 1 / sigma[shown] ** 2, int(np.count_nonzero(shown)) - 1
-    if freedom < 1:
+    Q, variance = scatter(step[shown], sigma[shown] ** 2)
+    if np.count_nonzero(shown) < 2 or scipy.special.chdtrc(np.count_nonzero(shown) - 1, Q) > DIFFERENT:
         return found
-    Q = float(w @ (step[shown] - w @ step[shown] / w.sum()) ** 2)
-    if float(scipy.special.chdtrc(freedom, Q)) > DIFFERENT:
-        return found
-    scatter = (Q - freedom) / (w.sum() - (w @ w) / w.sum())
-    sigma_of_all = float(np.sqrt(np.square(found.sigma) + scatter))
+    sigma_of_all = float(np.sqrt(np.square(found.sigma) + variance))
     return replace(found, sigma=sigma_of_all, of_logs=tuple((found.delay + step).tolist()))
 
 
@@ -255,10 +252,9 @@ class _Search:
 
     def _at(self, delay: float) -> Rows:
         """Return the rows at a delay, of which Y alone depends on it."""
-        parts = zip(self._rows.maps, self._delayed(delay), strict=True)
-        return replace(
-            self._rows, Y=np.concatenate([rows.measurement(self._chain.signals(log).torque.mean) for rows, log in parts])
-        )
+        parts = zip(self._rows.maps, self._delayed(delay), strict=True)  # with the prefilter that was found for their motion
+        torques = (rows.measurement(self._chain.signals(log, rows.signals).torque.mean) for rows, log in parts)
+        return replace(self._rows, Y=np.concatenate(list(torques)))
 
     def _delayed(self, delay: float) -> tuple[MotionLog, ...]:
         return tuple(replace(log, torque=replace(log.torque, delay=delay, lags=())) for log in self._logs)

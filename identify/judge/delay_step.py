@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from idbench.identify.arrays import Array
-from idbench.identify.estimators.leave_out import Stretches, left_out
+from idbench.identify.estimators.leave_out import Stretches, jackknife, left_out
 from idbench.identify.estimators.problem import Problem
 
 ROUNDS, SETTLED = 10, 0.1  # Steps at most, and share of a sigma below which the last one must be: 1 % of sigma^2
@@ -30,13 +30,7 @@ def delay_step(problem: Problem, slopes: Sequence[Array]) -> tuple[Array, Array]
         for part, D in zip(parts, slopes, strict=True)
     ]
     found = left_out(stretches.products(parts, rows))[:, -slopes[0].shape[-1] :]
-    return found[-1], jackknife(found[:-1])
-
-
-def jackknife(found: Array) -> Array:
-    """Standard deviations of what is estimated without each stretch, shape (stretch, k)."""
-    count = len(found)
-    return np.asarray(np.sqrt((count - 1) / count * np.sum((found - found.mean(axis=0)) ** 2, axis=0)))
+    return found[-1], np.sqrt(np.diagonal(jackknife(found[:-1])))
 
 
 def newton(

@@ -58,7 +58,7 @@ class _WhereItMoves(AbstractMask):
 RESOLUTION = 0.5  # Distance of the frequencies that are looked at [Hz]
 QUIET = 0.02  # Gain of the operator, as a share of that at rest, below which a frequency is above its band
 MIN_FREQUENCIES = 8  # Frequencies above the band that it takes to distinguish two kinds of noise
-FAINT = 1e-2  # Frequencies at which a kind of noise is below this share of its largest say nothing of it
+FAINT = 1e-2  # Relative power below which a frequency is ignored: above a prefilter, what masks let through exceeds noise
 
 
 def row_noise(left: Instants, signals: Signals, chain: Chain) -> Array:

@@ -8,6 +8,8 @@ from idbench.identify.errors import LogError
 from idbench.identify.estimators.leave_out import Stretches
 from idbench.identify.estimators.problem import Problem
 from idbench.identify.judge.used_rows import UsedRows, errors_left_out
+from idbench.identify.models import ExplicitModel
+from idbench.identify.rows.rows import manageable
 from idbench.identify.signals.masks import ReversalMask
 
 REACHES = (2.0, 4.0)
@@ -27,16 +29,20 @@ def suited_reach(problem: Problem) -> tuple[float, ...]:
     moving joints, where the written function is used: a wide mask must predict them better than the short one.
     Absolute errors count: no mask makes stiction itself predictable, and its squares would hide how well the rest is.
     """
-    explicit, mask = problem.explicit, problem.chain.mask
+    mask = problem.chain.mask
     if not isinstance(mask, ReversalMask) or mask.threshold is not None or problem.logs[0].poses:
         return ()
-    used, stretches = UsedRows.of(explicit), Stretches.of(explicit.parts)
+    logs = tuple(manageable(problem.logs))
+    explicit = Problem(logs, problem.basis, ExplicitModel(), problem.chain) if problem.long else problem.explicit
+    if not (used := UsedRows.of(explicit)):
+        return ()
+    stretches = Stretches.of(explicit.parts)
     best = errors_left_out(explicit, used, stretches)
     reach = np.zeros(problem.basis.n)
     for wide in REACHES:
         chain = replace(problem.chain, mask=replace(mask, reach=(wide,) * problem.basis.n))
         try:
-            errors = errors_left_out(replace(explicit, chain=chain, _signals=(), _explicit=None), used, stretches)
+            errors = errors_left_out(Problem(logs, problem.basis, ExplicitModel(), chain), used, stretches)
         except LogError:  # a short log has no room for wider edges
             break
         for j in range(problem.basis.n):

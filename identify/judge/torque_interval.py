@@ -49,14 +49,15 @@ class TorqueInterval:
         The first has the shape (joint,); it is NaN where a joint does not move. The second is `outside`, of the fit itself some
         1 % for each joint's speeds and torques.
         """
-        (used,) = UsedRows.of(held_out)
-        each = zip(_moving([used], [np.abs(used.errors(X))]), self.half, strict=True)
+        used = UsedRows.of(held_out)
+        errors = _moving(used, [np.abs(one.errors(X)) for one in used]) if used else [np.empty(0)] * len(self.half)
+        each = zip(errors, self.half, strict=True)
         inside = np.array([np.mean(error <= half) if len(error) else np.nan for error, half in each])
         return inside, self.outside(held_out.explicit.parts[0].signals)
 
 
 def torque_interval(estimate: Estimate, level: float = LEVEL) -> TorqueInterval | None:
-    """Return the intervals of an estimate of one run by block conformal prediction; None where rows are not kept.
+    """Return the intervals of an estimate of one run by block conformal prediction; None where rows are not kept, or too few.
 
     Every stretch is predicted by the estimate of the others (`moved`). The half width is `OTHER_MOTION` times the quantile of
     the absolute errors of the joint in all stretches (V. Vovk, A. Gammerman and G. Shafer, "Algorithmic Learning in a Random
@@ -76,7 +77,9 @@ def torque_interval(estimate: Estimate, level: float = LEVEL) -> TorqueInterval 
     problem = estimate.problem
     if problem.long or estimate.X.ndim > 1:
         return None
-    used, stretches = UsedRows.of(problem), Stretches.of(problem.parts)
+    if not (used := UsedRows.of(problem)):
+        return None
+    stretches = Stretches.of(problem.parts)
     moved = 0.0 if estimate.model_error is None else estimate.model_error.moved
     X = np.broadcast_to(estimate.X + moved, (stretches.count, len(estimate.X)))
     errors = _moving(used, [np.abs(one.errors(X[stretches.at(k, one.time)])) for k, one in enumerate(used)])

@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from idbench.identify.arrays import Array
 from idbench.identify.data.motion_log import MotionLog
+from idbench.identify.errors import LogError
 from idbench.identify.estimators.leave_out import Stretches, left_out
 from idbench.identify.estimators.problem import Problem
 from idbench.identify.models import ExplicitModel
@@ -38,8 +39,11 @@ class UsedRows:
 
     @classmethod
     def of(cls, problem: Problem) -> list[Self]:
-        """The rows of each log of a problem; of poses at rest all."""
-        return [cls._of_log(problem, log) for log in problem.logs]
+        """The rows of each log of a problem, of poses at rest all; none if a log is too short for this band."""
+        try:
+            return [cls._of_log(problem, log) for log in problem.logs]
+        except LogError:
+            return []
 
     @classmethod
     def _of_log(cls, problem: Problem, log: MotionLog) -> Self:

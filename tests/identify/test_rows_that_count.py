@@ -24,6 +24,8 @@ from idbench.identify import (
 from idbench.identify.basis import tree_basis
 from idbench.identify.judge.delay import estimate_delay
 from idbench.identify.judge.mask_choice import suited_reach
+from idbench.identify.judge.torque_interval import torque_interval
+from idbench.identify.rows.operators import Samples
 
 spec = importlib.util.spec_from_file_location("fault_logs", Path(__file__).parent / "fault_logs.py")
 assert spec is not None
@@ -137,3 +139,42 @@ def test_stiction_gets_a_wide_mask_and_coulomb_friction_does_not(log, rng):
 
     assert reach(noisy) == ()
     assert reach(stiction(noisy, 20.0, rng))[1] > 0
+
+
+def test_of_a_log_whose_rows_are_not_kept_the_beginning_decides(log, rng, monkeypatch):
+    """And nothing of the size of all its rows is made."""
+    noisy = replace(log, tau=log.tau + [0.05, 0.01] * rng.standard_normal(log.tau.shape))
+    sticky = stiction(noisy, 20.0, rng)
+    monkeypatch.setattr("idbench.identify.rows.rows.LONG", 0.75 * log.samples * log.n**2)
+    long = Problem((sticky,), scara(), ExplicitModel(), idbench_chain())
+    assert long.long
+    beginning = Problem((sticky.part(0, int(0.75 * log.samples)),), scara(), ExplicitModel(), idbench_chain())
+    assert suited_reach(long) == suited_reach(beginning)
+
+
+def test_a_log_too_short_for_10_hz_keeps_its_fit(log):
+    """Its chain has a shorter memory than rows of 10 Hz: no interval, and no choice of masks, but an estimate."""
+    chain = replace(idbench_chain(), operator=Samples())
+    short = log.part(500, 560)
+    found = identify(short, scara(), ExplicitModel(), chain)
+    assert np.isfinite(found.X).all()
+    assert torque_interval(found) is None
+    assert suited_reach(found.problem) == ()
+
+
+@pytest.mark.parametrize("apart", [0.0, 0.003])
+def test_logs_whose_delays_differ_are_said_to_differ(apart, log, rng):
+    """Sigma of one delay for both is then at least their scatter, apart / sqrt(2) for two, less what noise makes of it."""
+    each = []
+    for late in (0.002, 0.002 + apart):
+        tau = np.stack([np.interp(log.t - late, log.t, x) for x in log.tau.T], axis=1)
+        each.append(
+            MotionLog(log.fs, log.q, tau + [0.05, 0.005] * rng.standard_normal(tau.shape), TorqueChannel("instantaneous"))
+        )
+    found = estimate_delay(each, scara())
+    assert found.delay == pytest.approx(-0.002 - apart / 2, abs=2e-4)
+    assert bool(found.of_logs) == bool(apart)
+    assert ("the logs differ" in found.words) == bool(apart)
+    if apart:
+        np.testing.assert_allclose(found.of_logs, [-0.002, -0.005], atol=2e-4)
+        assert found.doubt > 0.9 * apart / np.sqrt(2)
