@@ -62,8 +62,14 @@ def one_too_few(log):
     return [log.part(500, 500 + samples)], chain
 
 
-@pytest.mark.parametrize("case", [at_rest, all_masked, edges_alone, duplicates, one_too_few])
-@pytest.mark.parametrize("name", ALONE)
+CASES = [
+    pytest.param(name, case, marks=[pytest.mark.thorough] if (name, case) == ("UKF", duplicates) else [])  # which takes 20 s
+    for name in ALONE
+    for case in (at_rest, all_masked, edges_alone, duplicates, one_too_few)
+]
+
+
+@pytest.mark.parametrize(("name", "case"), CASES)
 def test_no_estimate_is_nan(name, case, log):
     """Of a noise-free log: an estimate is finite, with finite standard errors, or it is refused by name."""
     given, chain = case(log)
