@@ -148,7 +148,7 @@ def paper_masked_chain() -> Chain:
 
 def unfiltered_chain() -> Chain:
     """As idbench, without a filter: every sample is a row."""
-    return replace(idbench_chain(), operator=Samples())
+    return replace(idbench_chain(), prefilter=NoPrefilter(), operator=Samples())
 
 
 def poses_chain() -> Chain:

@@ -34,6 +34,7 @@ from idbench.identify.estimators import (
     RecursiveLeastSquares,
     UnscentedKalmanFilter,
 )
+from idbench.identify.signals.prefilters import NoPrefilter
 from idbench.sim.controllers import PDFeedforward
 from idbench.sim.encoders import IncrementalEncoder
 from idbench.sim.engine.simulation import simulate
@@ -44,7 +45,7 @@ from idbench.sim.scenario.scenario_file import load
 from idbench.sim.trajectories import RandomMoves
 
 MOVES = RandomMoves(moves=12, durations=(1.3, 1.3), rest=0.7, seed=1)
-WIDE = replace(idbench_chain(), operator=replace(idbench_chain().operator, cutoff=20.0))
+WIDE = replace(idbench_chain(), prefilter=NoPrefilter(), operator=replace(idbench_chain().operator, cutoff=20.0))
 """The chain with a band up to 20 Hz, which lets the noise of accelerations through."""
 
 

@@ -143,7 +143,7 @@ def test_weights_converge_where_joints_carry_very_different_torques():
     scale = np.array([1, 1, 1, 1, 1, 1, 1e-5])
     tiny = problem.with_logs([logs.replace(log, tau=log.tau * scale)])
     two, many = (float(np.sum(tiny.factors.squares(tiny.factors.fit(k).X))) for k in (4, 12))
-    assert abs(two - many) < 1e-6 * many
+    assert abs(two - many) < 1e-4 * many  # of some thousand rows, a twentieth of what likelihood leaves to chance
 
 
 @pytest.mark.thorough
