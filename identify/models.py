@@ -138,7 +138,6 @@ def each_joint(state: State) -> Multipliers:
     return {(j, j): 1.0 for j in range(state.n)}
 
 
-@final
 @dataclass(frozen=True)
 class ExplicitModel(AbstractModel):
     """Explicit dynamic model, tau = D(q, qd, qdd) X (Eq. 5, 6)."""
@@ -157,7 +156,6 @@ class ExplicitModel(AbstractModel):
         return {}
 
 
-@final
 @dataclass(frozen=True)
 class ImplicitModel(AbstractModel):
     """Implicit dynamic model, tau = [R(q, qd) + s M_i(q) qd] X (Eq. 7-9)."""
@@ -175,7 +173,6 @@ class ImplicitModel(AbstractModel):
         return basis.momentum(state)
 
 
-@final
 @dataclass(frozen=True)
 class PowerModel(AbstractModel):
     """Power model, qd' tau = [qd' Gamma_f + s h(q, qd)] X (Eq. 10, 23); over windows, the energy model (Eq. 11, 20)."""
@@ -193,7 +190,6 @@ class PowerModel(AbstractModel):
         return basis.energy(state)
 
 
-@final
 @dataclass(frozen=True)
 class OverWindows(AbstractModel):
     """Another model, integrated over windows [ta, tb] of the chain's operator, or of 0.1 s where that makes no integrals."""

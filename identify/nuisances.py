@@ -2,14 +2,12 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import final
 
 import numpy as np
 
 from idbench.identify.arrays import Array
 
 
-@final
 @dataclass(frozen=True, eq=False)
 class Nuisances:
     """Nuisance parameters z of groups of rows, such as initial states, which follow a step x of the parameters.

@@ -3,7 +3,7 @@
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import ClassVar, final
+from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -114,7 +114,6 @@ class Error:
         return e, self._rate
 
 
-@final
 @settings
 class PDFeedforward(AbstractController):
     """PD with feedforward: u = feedforward tau_nominal(q_ref) + M (w^2 e + 2 zeta w de/dt)."""
@@ -150,7 +149,6 @@ class _PDLaw(AbstractLaw):
         return self._ahead[k] + self._kp * e + self._kd * rate
 
 
-@final
 @settings
 class PID(AbstractController):
     """PID: u = M (3 w^2 e + 3 w de/dt + w^3 int e), all poles at -w for a constant inertia."""
@@ -187,7 +185,6 @@ class _PIDLaw(AbstractLaw):
         return self._hold + self._kp * e + self._kd * rate + self._ki * self._sum
 
 
-@final
 @settings
 class ComputedTorque(AbstractController):
     """Computed torque: u = (1 + model_error) tau_nominal(q, qd, qdd_ref + w^2 e + 2 zeta w de/dt)."""
@@ -226,7 +223,6 @@ class _ComputedTorqueLaw(AbstractLaw):
         return self._share * self._model(q, self._reference.qd[k] - rate, qdd)
 
 
-@final
 @settings
 class PositionCommand(AbstractController):
     """The planned positions, sent to servos."""

@@ -2,7 +2,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import Literal, final
+from typing import Literal
 
 import numpy as np
 
@@ -48,7 +48,6 @@ class AbstractEncoder(ABC):
         raise ScenarioError(f"encoder {type(self).__name__} has no spread({n}), which a study with bound = true needs")
 
 
-@final
 @settings
 class ExactEncoder(AbstractEncoder):
     """Positions as they are."""
@@ -69,7 +68,6 @@ class _ExactReader(AbstractReader):
         return q.copy()
 
 
-@final
 @settings
 class IncrementalEncoder(AbstractEncoder):
     """Incremental encoder: lines, quadrature, interpolation error, noise, missed counts. A count in, an angle out."""

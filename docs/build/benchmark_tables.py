@@ -1,4 +1,4 @@
-"""The tables of the benchmark of public sets, from what `idbench benchmark` leaves.
+"""The tables of the benchmark of public sets, from what tests/benchmarks/public_sets.py leaves.
 
     uv run python docs/build/benchmark_tables.py runs/benchmark
 
@@ -13,6 +13,8 @@ from statistics import median
 from typing import Any
 
 from results import RESULTS, short, table
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "tests" / "benchmarks"))
 
 OWN = "idbench"
 TOOLS = {
@@ -35,7 +37,7 @@ def keep_benchmark(folder: Path) -> None:
 
 
 def _kept(row: Row) -> Row:
-    from idbench.experiments.benchmark.tables import free_run, share, worst_R2
+    from set_tables import free_run, share, worst_R2
 
     tools = {OWN: (row["logs"], row["seconds"])}
     tools |= {tool: (found["logs"], found["seconds"]) for tool, found in row["tools"].items() if "logs" in found}
@@ -133,7 +135,7 @@ BENCHMARK_TABLES = {
 
 def picture(place: Path) -> None:
     """Draw the torque errors of every joint, by set and tool."""
-    from idbench.experiments.benchmark.tables import errors_figure
+    from set_tables import errors_figure
 
     sets = [(row["title"], {name: row["percent"].get(tool, []) for tool, name in TOOLS.items()}) for row in _with_torques()]
     errors_figure(sets).savefig(place, dpi=120)

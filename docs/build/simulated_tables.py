@@ -2,7 +2,7 @@
 
     uv run python docs/build/simulated_tables.py runs/simulated
 
-keeps in docs/results what the page needs of the results of `idbench benchmark` on the sets that
+keeps in docs/results what the page needs of the results of tests/benchmarks/public_sets.py on the sets that
 tests/benchmarks/peers/simulated.py makes, and of the files of other tools beside them.
 """
 

@@ -1,4 +1,4 @@
-"""The other jobs: studies, payloads, gains, servos, motions, sets of logs, the paper's tables."""
+"""The other jobs: studies, payloads, gains, servos, motions, the paper's tables."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -8,7 +8,6 @@ from typing import Any
 
 from idbench.experiments.api.calls import PARTS, named, several
 from idbench.experiments.api.study_table import StudyTable
-from idbench.experiments.benchmark.job import rows_of
 from idbench.experiments.errors import ExperimentError, StudyError
 from idbench.experiments.excite.excited import Excited
 from idbench.experiments.excite.job import excited
@@ -103,12 +102,6 @@ def fit_servos(log: Files, robot: str | Path, servo: str | Path, **keys: Any) ->
 def design(robot: str | Path, **keys: Any) -> Excited:
     """Return an exciting trajectory within the robot's limits, as `idbench excite` designs it; its options by keyword."""
     return excited(_asked(jobs.ExciteRequest, "design", {**keys, "robot": robot}), _unheard)[0]
-
-
-def benchmark(*sets: str | Path, out: str | Path = Path("runs") / "benchmark", force: bool = False) -> dict[str, Any]:
-    """Return the rows of sets of real logs, by name, as `idbench benchmark` makes them; or why a set has none."""
-    asked = _asked(jobs.BenchmarkRequest, "benchmark", {}, sets=sets)
-    return dict(rows_of(asked, Path(out), _unheard, force=force))
 
 
 def table1(**keys: Any) -> Table1:

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, final
+from typing import Any
 
 import numpy as np
 
@@ -33,7 +33,6 @@ from idbench.sim.engine.run import Run
 from idbench.sim.robot.robot import Robot
 
 
-@final
 @dataclass(frozen=True)
 class ParameterEstimate:
     """One parameter with its standard error."""
@@ -50,7 +49,6 @@ class ParameterEstimate:
     """The true value, where it is known."""
 
 
-@final
 @dataclass(frozen=True, eq=False)
 class Score:
     """Errors of the predicted torques of a held-out log, while joints move."""
@@ -86,7 +84,6 @@ class Score:
         return f"{self.verdict.word}: {'; '.join(self.verdict.reasons)}", ["", "rms error", "unit", "% of torque"], rows
 
 
-@final
 @dataclass(frozen=True, eq=False)
 class Identification:
     """Logs, identified: parameters with standard errors, predictions, and a verdict on held-out data."""
@@ -275,7 +272,6 @@ class Identification:
             yield [p.name, concise(p.value, p.sigma), p.unit, relative(p.value, p.sigma), *truth]
 
 
-@final
 @dataclass(frozen=True, eq=False)
 class SimulatedRun:
     """A scenario that was simulated: a log as a robot would give it, and the truth behind it."""

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from io import StringIO
-from typing import Any, final
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -18,7 +18,6 @@ from idbench.experiments.text import printed
 WIDTH = 160  # Characters of a line
 
 
-@final
 @dataclass(frozen=True, eq=False)
 class StudyTable:
     """The runs of a study, and what they say of every combination."""

@@ -2,7 +2,6 @@
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import final
 
 import numpy as np
 
@@ -42,7 +41,6 @@ class AbstractExcitation(ABC):
         return [self.random(rng, plan, duration, frequency) for _ in range(count)]
 
 
-@final
 @dataclass(frozen=True)
 class FourierExcitation(AbstractExcitation):
     """Finite Fourier series, whose period is the duration."""
@@ -87,7 +85,6 @@ class FourierExcitation(AbstractExcitation):
         return Fourier(duration, tuple(mean + middle), _rows(sines), _rows(cosines), repeat, 0.0, REST)
 
 
-@final
 @dataclass(frozen=True)
 class MovesExcitation(AbstractExcitation):
     """Fifth-order moves of equal duration, for controllers that accept only points."""

@@ -6,7 +6,6 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import final
 
 from idbench.experiments.exports.functions import Function, RobotFunctions
 from idbench.identify.basis.tape import Step, Symbol, Tape, Value
@@ -24,7 +23,6 @@ RESERVED = frozenset({*keyword.kwlist, *C_WORDS.split(), "half_width", "fitted_s
 """What no parameter can be called in the code."""
 
 
-@final
 @dataclass(frozen=True)
 class Language:
     """How a language writes formulas."""
@@ -95,7 +93,6 @@ def identifiers(names: Sequence[str]) -> list[str]:
     return found
 
 
-@final
 @dataclass(frozen=True, eq=False)
 class Content:
     """What a file of functions holds."""

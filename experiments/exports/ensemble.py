@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path
-from typing import Any, final
+from typing import Any
 
 import numpy as np
 
@@ -38,7 +38,6 @@ USUAL = 0.2
 """Share by which parameters are often varied where nothing is known of them, as in the published randomizations of robots."""
 
 
-@final
 @dataclass(frozen=True, eq=False)
 class FreeRuns:
     """Free runs of the robots that were drawn, on a log."""
@@ -80,7 +79,6 @@ class FreeRuns:
         return said if every >= LEVEL - 0.02 else f"{said}: less than {100 * LEVEL:.0f} %, the model lacks something there"
 
 
-@final
 @dataclass(frozen=True, eq=False)
 class Ensemble:
     """Physically consistent robots with what an estimate leaves open: standard errors with the model's, delay's and noise's.

@@ -5,7 +5,6 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from importlib.metadata import version
 from pathlib import Path
-from typing import final
 
 from idbench.experiments.exports import robots
 from idbench.experiments.exports.base_parameters import interval_of, json_text
@@ -22,7 +21,6 @@ from idbench.sim.robot.rewrite import rewritten
 FOLDER = ".ensemble"  # Ending of the name of a folder with robots
 
 
-@final
 @dataclass(frozen=True)
 class Exported:
     """What is written, and what is to be known of it."""
@@ -35,7 +33,6 @@ class Exported:
     """What else is to be said of them."""
 
 
-@final
 @dataclass(frozen=True)
 class FileKind:
     """A kind of file."""

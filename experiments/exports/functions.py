@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, final
+from typing import Any
 
 import numpy as np
 
@@ -43,7 +43,6 @@ class Function:
     """Its result, in a row."""
 
 
-@final
 @dataclass(frozen=True, eq=False)
 class RobotFunctions:
     """Functions of a robot with the parameters of a basis, which stay symbols: another identification only has other values."""
@@ -221,7 +220,6 @@ class RobotFunctions:
         return sources - {"q", "qd", "qdd", "tau", "parameter"}
 
 
-@final
 @dataclass(frozen=True, eq=False)
 class _AboutParameters(AbstractBlock):
     """A block whose columns are slopes at parameters that are symbols."""

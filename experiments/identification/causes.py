@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, final
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -106,7 +106,6 @@ LENGTHS = frozenset({"tilt", "axis", "eccentric", "cogging", "base_motion"})
 """Causes of two sizes across each other, whose length is reported."""
 
 
-@final
 @dataclass(frozen=True, eq=False)
 class Cause:
     """A mistake that residuals show, of a robot and its log."""

@@ -4,7 +4,6 @@ from collections.abc import Collection
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import final
 
 import numpy as np
 
@@ -19,7 +18,6 @@ from idbench.sim.robot.tree import standard_parameters
 LITTLE = 0.1  # Differences of torques of less than so many per cent are not named
 
 
-@final
 @dataclass(frozen=True, eq=False)
 class WrittenRobot:
     """The physically consistent robot that agrees best with an estimate, as a file."""

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Self, final
+from typing import Any, Self
 
 import numpy as np
 
@@ -35,7 +35,6 @@ Outcomes = dict[str, Estimate | IdentificationError]
 """The estimate of every model, or why it has none."""
 
 
-@final
 @dataclass(frozen=True, eq=False)
 class Fit:
     """Logs, identified."""

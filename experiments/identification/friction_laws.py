@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass, replace
 from itertools import chain
-from typing import Any, final
+from typing import Any
 
 from idbench.experiments.errors import ExperimentError
 from idbench.identify import (
@@ -41,7 +41,6 @@ COMPARED = ("offset", "asymmetric-viscous", "load", "stribeck", "arctan", "tanh"
 Coulomb friction at rest alone, where no mask takes that out."""
 
 
-@final
 @dataclass(frozen=True)
 class FrictionLaws:
     """The laws of each joint."""

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import inf, isfinite
-from typing import Self, final
+from typing import Self
 
 import numpy as np
 
@@ -20,7 +20,6 @@ KINDS: Mapping[str, frozenset[Kind]] = {"links": BODY, "armatures": frozenset({"
 FILE = "file"  # Word for the value in the robot's file
 
 
-@final
 @dataclass(frozen=True)
 class Known:
     """Values of parameters, by name; None stands for the value in the robot's file."""
@@ -76,7 +75,6 @@ class Known:
 SHARE = 1.0  # Relative change of the links of a file that is expected where nobody says it and no log has been asked
 
 
-@final
 @dataclass(frozen=True)
 class Trust:
     """A value that is roughly known."""
@@ -94,7 +92,6 @@ class Trust:
         return value, self.sigma * abs(value) if self.relative else self.sigma
 
 
-@final
 @dataclass(frozen=True)
 class RoughlyKnown:
     """What is roughly known: links near the file, and values of parameters with their standard deviations."""

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, final
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 STILL = 1e-3  # A joint is at rest while its velocity is below this share of its largest
 
 
-@final
 @dataclass(frozen=True, eq=False)
 class LogFacts:
     """What a log is like."""

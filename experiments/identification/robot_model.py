@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Self, final
+from typing import Any, Self
 
 import numpy as np
 
@@ -25,7 +25,6 @@ from idbench.sim.robot.tree import kinematic_tree, standard_parameters
 SCARA = "scara"  # The robot of the paper, which is taken where none is named
 
 
-@final
 @dataclass(frozen=True, eq=False)
 class RobotModel:
     """A robot by its name or file, and which of its parameters are asked for."""

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import ceil
 from pathlib import Path
-from typing import final
 
 import numpy as np
 
@@ -26,7 +25,6 @@ of robots of others the shares are 0.04 and 0.27 at most; of three by another in
 DERIVATIVES = 4  # Of the positions, that the torques of a step take
 
 
-@final
 @dataclass(frozen=True, eq=False)
 class SimulatedLogs:
     """How torques of a simulation of a robot's file are read."""

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Self, final
+from typing import Self
 
 import numpy as np
 import numpy.typing as npt
@@ -29,7 +29,6 @@ IMPOSSIBLE = "; if the loop is right, the parameters are not physically consiste
 SAME = 1e-6  # Share by which frequencies that are the same differ at most
 
 
-@final
 @dataclass(frozen=True, eq=False)
 class Fields:
     """MuJoCo's model of a robot with parameters of its basis."""
@@ -83,7 +82,6 @@ class Fields:
         return scale[:, None] * np.linalg.pinv(grouping.K * scale)
 
 
-@final
 @dataclass(frozen=True, eq=False)
 class ScenarioLoop(AbstractLoop):
     """The closed loops of scenarios, one for each log, without noise, ripple and payload."""
@@ -144,7 +142,6 @@ class ScenarioLoop(AbstractLoop):
         return Fields(self.robot_model)
 
 
-@final
 @dataclass(frozen=True, eq=False)
 class RobotPlant(AbstractPlant):
     """The robot by itself."""

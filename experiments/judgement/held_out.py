@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import ceil
-from typing import Any, Self, final
+from typing import Any, Self
 
 import numpy as np
 
@@ -33,7 +33,6 @@ docs/results-arms.md has the table of right and wrong models from which these co
 WORDS = ("good", "fair", "unsure", "poor")  # Verdicts, the worst last
 
 
-@final
 @dataclass(frozen=True, eq=False)
 class Verdict:
     """What to think of one model on a held-out log."""
@@ -144,7 +143,6 @@ def on_last_quarter(result: Fit) -> "HeldOut":
     return HeldOut(fit(result.request, replace(logs, fitted=fitted)), manageable([end])[0], title, result.diagnosis or ())
 
 
-@final
 @dataclass(frozen=True, eq=False)
 class HeldOut:
     """A fit on a log that it was not fitted to."""

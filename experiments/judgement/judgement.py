@@ -2,14 +2,13 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, final
+from typing import Any
 
 from idbench.experiments.errors import is_told, reason, trace
 from idbench.experiments.identification.fit import Fit
 from idbench.experiments.judgement.held_out import WORDS, HeldOut, on_last_quarter, on_log
 
 
-@final
 @dataclass(frozen=True)
 class Unjudged:
     """A held-out log on which a fit could not be judged."""
@@ -26,7 +25,6 @@ class Unjudged:
         return {"on": self.title, "models": {}, "failure": self.why}
 
 
-@final
 @dataclass(frozen=True, eq=False)
 class Judgement:
     """A fit, judged."""

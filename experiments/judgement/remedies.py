@@ -3,7 +3,6 @@
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from typing import final
 
 import numpy as np
 
@@ -81,7 +80,6 @@ def delay_advice(result: Fit) -> Iterator[str]:
         )
 
 
-@final
 @dataclass(frozen=True, eq=False)
 class Remedies:
     """Options of identification, tried on a held-out log."""

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Self, final
+from typing import Any, Self
 
 import numpy as np
 
@@ -74,7 +74,6 @@ OPTIONS = {"ML": "--mass", "MXL": "--at", "MYL": "--at", "MZL": "--at"}
 """Options that state parameters of a payload; those of its inertia by --inertia."""
 
 
-@final
 @dataclass(frozen=True, eq=False)
 class LoadJudgement:
     """Logs without and with a payload, judged by one estimate of robot and payload."""

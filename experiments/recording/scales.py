@@ -4,7 +4,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import ceil
-from typing import final
 
 import numpy as np
 import numpy.typing as npt
@@ -52,7 +51,6 @@ class AbstractScale(ABC):
         """Return round values that cover the axis."""
 
 
-@final
 @dataclass(frozen=True)
 class Linear(AbstractScale):
     """An axis of equal steps."""
@@ -64,7 +62,6 @@ class Linear(AbstractScale):
         return round_values(self.low, self.high)
 
 
-@final
 @dataclass(frozen=True)
 class Decades(AbstractScale):
     """A logarithmic axis."""
@@ -76,7 +73,6 @@ class Decades(AbstractScale):
         return decade_values(self.low, self.high)
 
 
-@final
 @dataclass(frozen=True)
 class Signed(AbstractScale):
     """An axis of decades to both sides of 0, linear up to `bend` (inverse hyperbolic sine)."""
@@ -93,7 +89,6 @@ class Signed(AbstractScale):
         return np.concatenate([-powers, [0.0], powers])
 
 
-@final
 @dataclass(frozen=True)
 class Words(AbstractScale):
     """An axis of names, at 0, 1, 2 and so on."""

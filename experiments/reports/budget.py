@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import final
 
 import numpy as np
 
@@ -15,7 +14,6 @@ from idbench.sim.trajectories import Reference
 ROUNDING = 1e-12  # Torques below this share of the total are rounding
 
 
-@final
 @dataclass(frozen=True, eq=False)
 class Budget:
     """The largest torques that each cause asks of the joints along a motion."""

@@ -3,7 +3,6 @@
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from html import escape
-from typing import final
 
 import numpy as np
 
@@ -24,7 +23,6 @@ FINE = 2
 Scale = Callable[[Array], Array]
 
 
-@final
 @dataclass
 class PanelAxis:
     """One direction of a panel."""
@@ -65,7 +63,6 @@ class PanelAxis:
         return {x: f"{x:.6g}" for x in round_values(low, high).tolist()}
 
 
-@final
 @dataclass
 class Panel:
     """A pair of axes, and what is drawn between them."""

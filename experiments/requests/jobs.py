@@ -254,15 +254,3 @@ class Table2Request:
 
     scenario: str = "table2"
     """Name of a scenario, or a file (TOML)."""
-
-
-@dataclass(frozen=True)
-class BenchmarkRequest:
-    """Identify sets of real logs, and judge each on logs that it was not fitted to."""
-
-    sets: Logs = ()
-    """Folders with a benchmark.toml and its data; `idbench new set NAME` writes a definition that ships."""
-    workers: Count = None
-    """Run in this number of processes (extra `cluster`)."""
-    scheduler: Url = None
-    """Run on a Dask scheduler, such as tcp://host:8786, whose workers see the same files (extra `cluster`)."""

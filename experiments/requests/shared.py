@@ -1,7 +1,7 @@
 """What requests of several jobs have in common: columns of a log, the mounting of a robot, its parameters."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Literal, final
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from idbench.experiments.requests.words import Delay, Each, File, Hertz, Joints, Laws, Names, Robot, Texts, Torque, Vector, Word
 
@@ -12,7 +12,6 @@ CHAIN, ESTIMATOR = "idbench", "GLS"
 """What is taken where nothing else is asked for, as `identify` has it; here, since the command line's help loads no more."""
 
 
-@final
 @dataclass(frozen=True)
 class Parameters:
     """Which parameters are identified."""
@@ -42,7 +41,6 @@ class Parameters:
     volume:0.58 for gas [m, rad]: F0, Kb and Fg are identified."""
 
 
-@final
 @dataclass(frozen=True)
 class ColumnOptions:
     """What the columns are."""
@@ -73,7 +71,6 @@ class ColumnOptions:
         return bool(self.layout or self.columns or self.units or self.gain or self.rows)
 
 
-@final
 @dataclass(frozen=True)
 class MountingOptions:
     """How the robot is mounted."""

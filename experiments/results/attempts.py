@@ -4,7 +4,7 @@ import sys
 from collections.abc import Callable
 from contextlib import suppress
 from types import TracebackType
-from typing import TYPE_CHECKING, Self, TypeVar, final
+from typing import TYPE_CHECKING, Self, TypeVar
 
 from idbench.experiments.errors import REPORT, ResultsError, is_told, reason, report, trace
 from idbench.experiments.results.folder import ResultsFolder
@@ -38,7 +38,6 @@ def write_streams(streams: "Streams", folder: ResultsFolder | None) -> None:
             stream.close()
 
 
-@final
 class Attempts:
     """Works on results that are complete; one that fails takes nothing away from the others.
 

@@ -7,7 +7,6 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from fnmatch import fnmatch
 from pathlib import Path
-from typing import final
 
 from idbench.experiments.errors import ResultsError
 from idbench.experiments.results.writing import NAME, Manifest, Read, WrittenFile, digest, exchange, hidden_folder
@@ -30,15 +29,12 @@ FILES: Mapping[str, tuple[str, ...]] = {
     "excite": (*COMMON, "scenario.toml", "report.html", "motion*.csv"),
     "payload": ("summary.json", "fault.txt"),
     "gains": ("summary.json", "fault.txt"),
-    "benchmark": ("summary.json", "report.html", "fault.txt"),
-    "benchmark-set": ("summary.json", "fit*.npz", "held_out*.npz", "robot.urdf", "fault.txt", "identified.*", "SOURCE.md"),
     "servo": ("summary.json", RECORDING, "fault.txt"),
     "study": ("summary.json", "report.html", "recording.rrd", "fault.txt"),
 }
 """What an experiment may write: files of these names are looked for before the work."""
 
 
-@final
 @dataclass(frozen=True)
 class ResultsFolder:
     """The folder of an experiment's results."""

@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from io import StringIO
-from typing import Any, Protocol, TextIO, final
+from typing import Any, Protocol, TextIO
 
 from rich.console import Console, ConsoleOptions, RenderableType
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
@@ -107,7 +107,6 @@ COLORS = {"good": "green", "fair": "yellow", "poor": "red"}  # Of the verdicts
 NOT_SAVED = "not saved: --out FOLDER keeps it, with a report and a recording"  # What is said where nobody named a folder
 
 
-@final
 class Page(Console):
     """A console that keeps what is printed until it is shown; what cannot be shown is reported at the end.
 

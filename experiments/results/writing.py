@@ -13,7 +13,7 @@ from importlib.metadata import version
 from math import isfinite
 from pathlib import Path
 from shutil import rmtree
-from typing import Any, Self, final
+from typing import Any, Self
 
 import numpy as np
 
@@ -189,7 +189,6 @@ def _is_running(process: int) -> bool:
 NAME = ".idbench.json"  # Name of its file in a folder
 
 
-@final
 @dataclass(frozen=True)
 class WrittenFile:
     """A file that idbench wrote."""
@@ -200,7 +199,6 @@ class WrittenFile:
     """Of its content, and of that which was there before: an exchange may have been cut off between the two."""
 
 
-@final
 @dataclass(frozen=True)
 class Manifest:
     """The files of a folder that idbench wrote."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from functools import cached_property
 from pathlib import Path
-from typing import Any, final
+from typing import Any
 
 import numpy as np
 import tomli_w
@@ -57,7 +57,6 @@ def write_commands(run: Run, robot: Robot, path: Path) -> None:
 AUTO = "auto"  # In the place of a law of friction: that which the log needs
 
 
-@final
 @dataclass(frozen=True, eq=False)
 class Servos:
     """Servos of a robot with their logs; joints have their names."""

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, final
+from typing import Any
 
 import numpy as np
 
@@ -29,7 +29,6 @@ from idbench.sim.robot.robot import Robot
 from idbench.sim.robot.time_steps import steps_of
 
 
-@final
 @dataclass(frozen=True, eq=False)
 class ServosFit:
     """Servos of a robot, identified and judged."""

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from typing import NamedTuple, final
+from typing import NamedTuple
 
 import numpy as np
 
@@ -43,7 +43,6 @@ class JointsLog(NamedTuple):
     links: Robot
 
 
-@final
 @dataclass(frozen=True, eq=False)
 class Joints:
     """Joints of a robot, by their numbers."""

@@ -10,7 +10,6 @@ from pathlib import Path
 
 from jinja2 import Environment, StrictUndefined
 
-from idbench.experiments.benchmark.definition import SHIPPED, read_definition, shipped
 from idbench.experiments.errors import ExperimentError, ResultsError
 from idbench.experiments.plugin_tables import TABLES
 from idbench.experiments.results.writing import exchange, folder_for, hidden_folder
@@ -73,21 +72,6 @@ def new_example(name: str, robot: str, out: Path) -> None:
     if robot not in names():
         raise ExperimentError(f"no shipped robot {robot!r}{did_you_mean(robot, names())}; known: {', '.join(names())}")
     _write(out, example_files(robot))
-
-
-def new_set(name: str, out: Path) -> str:
-    """Write the definition of a set that ships into a new folder; return how to get its data.
-
-    Raises
-    ------
-    ExperimentError
-        If there is no such set, or something is there already.
-    """
-    if name not in shipped():
-        raise ExperimentError(f"no set {name!r}{did_you_mean(name, shipped())}; known: {', '.join(shipped())}")
-    _require_free(out)
-    _write(out, {path.name: path.read_text(encoding="utf-8") for path in (SHIPPED / name).iterdir() if path.is_file()})
-    return read_definition(out).get
 
 
 def new_plugin(name: str, kind: str, out: Path) -> None:

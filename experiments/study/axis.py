@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from dataclasses import field as field_of
 from functools import cached_property
 from itertools import product
-from typing import Any, Literal, final
+from typing import Any, Literal
 
 import numpy as np
 
@@ -22,7 +22,6 @@ FRICTION = "friction laws"
 """Field of the axis of the laws of friction that are identified; `friction` is that of the simulated robot."""
 
 
-@final
 @settings
 class Axis:
     """A setting and the values that it takes, listed or evenly spaced."""

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import prod
-from typing import Annotated, Any, Literal, final
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field
@@ -46,7 +46,6 @@ class Point:
     settings: tuple[Setting, ...]
 
 
-@final
 @settings
 class Study:
     """A scenario over axes and seeds, and how its logs are identified."""

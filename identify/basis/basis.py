@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Self, final
+from typing import Self
 
 import numpy as np
 
@@ -15,7 +15,6 @@ from idbench.identify.errors import PluginError, SettingError
 from idbench.identify.signals.signals import State
 
 
-@final
 @dataclass(frozen=True)
 class Basis:
     """A sum of column blocks for a robot of n joints; ``basis + block`` adds one.

@@ -46,7 +46,6 @@ def named(letters: str, joint: int) -> str:
     return f"{letters}{joint + 1}"
 
 
-@final
 @dataclass(frozen=True)
 class Parameter:
     """A parameter of a robot's model, such as the viscous friction of joint 2.

@@ -97,7 +97,6 @@ class AbstractFriction(AbstractJointLaw):
         return {self.symbol: self.force(state.q, state.qd)}
 
 
-@final
 @dataclass(frozen=True)
 class Armature(AbstractConservativeBlock):
     """Inertia of a rotor, seen at its joint: Ia qdd, in the row of the joint alone.

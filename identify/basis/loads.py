@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Set
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Self, final
+from typing import Self
 
 import numpy as np
 
@@ -17,7 +17,6 @@ from idbench.identify.errors import SettingError
 from idbench.identify.signals.signals import State
 
 
-@final
 @dataclass(frozen=True)
 class DriveGains(AbstractJointLaw):
     """What the gain of a drive is in multiples of the one that a log was read with, kg.
@@ -61,7 +60,6 @@ class DriveGains(AbstractJointLaw):
 HELD_SHARE = "payload"  # Condition of a log: the share of the payload that is held, 0 without and 1 with it
 
 
-@final
 @dataclass(frozen=True, eq=False)
 class PayloadLink(AbstractConservativeBlock):
     """A payload on a link, XXL XYL XZL YYL YZL ZZL MXL MYL MZL ML in the frame of the link, in the logs that have it.

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Self, final
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from idbench.identify.basis.basis import Basis
 
 
-@final
 @dataclass(frozen=True)
 class OfJoints(AbstractBlock):
     """A block, the parameters of some joints of it alone: friction that differs from joint to joint."""
@@ -73,7 +72,6 @@ def block_of_all_joints(block: AbstractBlock) -> AbstractBlock:
     return block.block if isinstance(block, OfJoints) else block
 
 
-@final
 @dataclass(frozen=True, eq=False)
 class Coupled(AbstractBlock):
     """What a drive adds whose motor turns with several joints, theta = weights' q: its rotor, its frictions, a spring.

@@ -1,7 +1,7 @@
 """Columns of links as a list of operations: found once on symbols, done in pieces of the motion that stay in the cache."""
 
 from collections.abc import Hashable, Mapping
-from typing import Any, Generic, NamedTuple, TypeVar, final
+from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -69,7 +69,6 @@ class _Step(NamedTuple):
     result: int
 
 
-@final
 class Program(Generic[Key]):
     """Values of a tape as functions of a motion.
 

@@ -1,7 +1,6 @@
 """Balancers: springs and gas springs between two points."""
 
 from dataclasses import dataclass
-from typing import final
 
 import numpy as np
 
@@ -11,7 +10,6 @@ from idbench.identify.errors import SettingError, require_finite, require_positi
 from idbench.identify.signals.signals import State
 
 
-@final
 @dataclass(frozen=True)
 class Spring(AbstractConservativeBlock):
     """Springs of joints, K (q - rest); where the rest position is not known, `offset` takes its torque."""
@@ -50,7 +48,6 @@ def _stiffness(j: int) -> Parameter:
     return Parameter("K", j, "stiffness", "N m/rad")
 
 
-@final
 @dataclass(frozen=True)
 class Balancer(AbstractConservativeBlock):
     """A balancer of a joint, between a point of its link and one that stands: a spring, and a hydraulic gas spring.

@@ -1,7 +1,7 @@
 """Arrays of symbols, for code that is written for arrays of numbers."""
 
 from collections.abc import Callable
-from typing import Any, final
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -14,7 +14,6 @@ Values = list[Any]
 """Arrays of symbols, or numbers."""
 
 
-@final
 class SymbolArray(NDArrayOperatorsMixin):
     """An array of values that are recorded, for code that is written for arrays of numbers.
 

@@ -5,7 +5,7 @@ Kleinfinger, IEEE Journal of Robotics and Automation 3 (1987) 517-526).
 """
 
 from collections.abc import Callable, Iterable
-from typing import Any, TypeAlias, final
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -52,7 +52,6 @@ Step: TypeAlias = tuple[Any, ...]
 """An operation and what it takes: numbers of earlier steps (int), or constants (float). Of an input, where it comes from."""
 
 
-@final
 class Symbol:
     """The value of a step, one object a step."""
 
@@ -90,7 +89,6 @@ Value: TypeAlias = Symbol | float
 """One value."""
 
 
-@final
 class Tape:
     """What was computed, every value once."""
 

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator, Mapping, Set
 from dataclasses import dataclass, replace
 from functools import cache, lru_cache
-from typing import Any, NamedTuple, Self, TypeAlias, final
+from typing import Any, NamedTuple, Self, TypeAlias
 
 import numpy as np
 
@@ -123,7 +123,6 @@ def energy(V: Twist, up: Vector, height: Term) -> tuple[Term, ...]:
     return (*squares, *add(cross(v, w), up), plus(times(0.5, dot(v, v)), height))
 
 
-@final
 @dataclass(frozen=True)
 class TreeLinks(AbstractConservativeBlock):
     """Rigid links of a tree, ten parameters each: XX1 XY1 XZ1 YY1 YZ1 ZZ1 MX1 MY1 MZ1 M1, XX2, ...

@@ -3,7 +3,6 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 from math import comb
-from typing import final
 
 import numpy as np
 import numpy.typing as npt
@@ -65,7 +64,6 @@ ROUNDING = 1e-3  # Share of the largest travel of a joint that no jump is below
 COUNTS = 2.5  # Steps of its encoder that no jump is below: quiet joints tremble by one, and creep by one after the other
 
 
-@final
 @dataclass(frozen=True)
 class Jump:
     """A step of a position that the motion around it does not explain."""

@@ -1,7 +1,7 @@
 """The kinematics of a robot: all that identification needs to know of its geometry."""
 
 from dataclasses import dataclass
-from typing import Literal, final, get_args
+from typing import Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -19,7 +19,6 @@ INERTIAL = ("XX", "XY", "XZ", "YY", "YZ", "ZZ", "MX", "MY", "MZ", "M")
 ROUNDING = 1e-12  # Entries of rotations and axes below this are rounding, and zero
 
 
-@final
 @dataclass(frozen=True, eq=False)
 class Joint:
     """A joint, and the link that it moves.
@@ -77,7 +76,6 @@ class Joint:
         return array
 
 
-@final
 @dataclass(frozen=True)
 class Coupling:
     """A drive whose motor turns with several joints, theta = weights' q."""
@@ -96,7 +94,6 @@ class Coupling:
             raise KinematicsError(f"coupling {self.name}: weights {self.weights} must be finite, and not all 0")
 
 
-@final
 @dataclass(frozen=True, eq=False)
 class KinematicTree:
     """A tree of links on the ground, a joint each, with bodies that are welded together as one link.

@@ -3,7 +3,7 @@
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar, final
+from typing import ClassVar
 
 import numpy as np
 
@@ -28,7 +28,6 @@ class AbstractCriterion(ABC):
         """Return its derivative Q by M, shape (p, p), symmetric: a change dM adds tr(Q dM)."""
 
 
-@final
 @dataclass(frozen=True)
 class Determinant(AbstractCriterion):
     """D-optimality, -ln det(M) / 2p: the mean of ln sigma but for correlations; units only add a constant."""
@@ -43,7 +42,6 @@ class Determinant(AbstractCriterion):
         return -np.linalg.inv(M) / (2 * len(M))
 
 
-@final
 @dataclass(frozen=True)
 class LogSigma(AbstractCriterion):
     """Weighted mean of ln sigma_i: what the table of sigmas shows."""
@@ -61,7 +59,6 @@ class LogSigma(AbstractCriterion):
         return -(V * (np.array(self.weights) / (2 * np.diag(V)))) @ V
 
 
-@final
 @dataclass(frozen=True)
 class Condition(AbstractCriterion):
     """ln Cond(W), of W as it is: what most of the field minimises; it depends on units, and not on the noise."""
@@ -79,7 +76,6 @@ class Condition(AbstractCriterion):
         return (_square(vectors[:, -1]) / values[-1] - _square(vectors[:, 0]) / values[0]) / 2
 
 
-@final
 @dataclass(frozen=True)
 class ConditionAndSmallest(AbstractCriterion):
     """ln(Cond(W' W) + 100 / s_min), of W as it is: that of the benchmark BIRDy."""
@@ -99,7 +95,6 @@ class ConditionAndSmallest(AbstractCriterion):
         return (_square(vectors[:, -1]) / low + by_low * _square(vectors[:, 0])) / (high / low + 100 / np.sqrt(low))
 
 
-@final
 @dataclass(frozen=True)
 class Smallest(AbstractCriterion):
     """-ln s_min, of W as it is (E-optimality)."""

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Self, final
+from typing import Self
 
 import numpy as np
 import numpy.typing as npt
@@ -19,7 +19,6 @@ RIDGE, NOTHING = 1e-11, 1e-200
 below which a column counts as none."""
 
 
-@final
 @dataclass(frozen=True)
 class Stretches:
     """Stretches of the logs of a fit, numbered through."""

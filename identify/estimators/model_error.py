@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Self, final
+from typing import Self
 
 import numpy as np
 
@@ -11,7 +11,6 @@ from idbench.identify.estimators.leave_out import jackknife, moved
 from idbench.identify.estimators.log_rows import LogRows
 
 
-@final
 @dataclass(frozen=True, eq=False)
 class ModelError:
     """The error that a wrong model gives an estimate X = G' Y, beyond that of noise. Leading axes are runs."""

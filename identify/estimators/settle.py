@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
-from typing import Any, final
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -227,7 +227,6 @@ def _best(rows: AdaptiveRows, basis: Basis, shaped: ShapedFriction, joints: Sequ
     return shaped.at({name: np.where(np.isnan(x), now[name], x) for name, x in new.items()})
 
 
-@final
 @dataclass(frozen=True, eq=False)
 class Candidates(AbstractJointLaw):
     """One law with several settings, a parameter each: to see which of them explains most."""

@@ -3,7 +3,6 @@
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import final
 
 import numpy as np
 
@@ -33,7 +32,6 @@ class AbstractSolution(ABC):
         """Return [W Y] made independent, shape (..., r, p + 1), each row by those before it, if X is their solution."""
 
 
-@final
 @dataclass(frozen=True, eq=False)
 class OfWeightedRows(AbstractSolution):
     """The solution of rows of which each has a weight."""
@@ -71,7 +69,6 @@ class OfWeightedRows(AbstractSolution):
         return [weight * part.weights if scaled else weight for part, weight in zip(parts, of_kinds, strict=True)]
 
 
-@final
 @dataclass(frozen=True, eq=False)
 class OfWhitenedRows(AbstractSolution):
     """The solution of rows made independent by their covariance, W without what noise adds to it."""
@@ -95,7 +92,6 @@ class OfWhitenedRows(AbstractSolution):
         return [part.whitening.whiten(part.unbiased.joined) for part in parts]
 
 
-@final
 @dataclass(frozen=True, eq=False)
 class Given(AbstractSolution):
     """The G, and the weights, of the rows of all parts, one below the other."""

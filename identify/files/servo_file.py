@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import Any, final
+from typing import Any
 
 import numpy as np
 
@@ -30,7 +30,6 @@ MAX_OVER_SUPPLY = 1.5
 ROBOT = "robot"  # What a log may state beside: the robot, links and load, that it is of
 
 
-@final
 @dataclass(frozen=True)
 class ServoFile:
     """What is known of the servos of a robot."""

@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import final
 
 import numpy as np
 
@@ -32,7 +31,6 @@ NAME_IT = "Name it: --columns command=NAME, a * in it for numbers or names of jo
 OPTIONAL = ("forward", "on", "voltage")
 
 
-@final
 @dataclass(frozen=True, eq=False)
 class ServoColumns:
     """Columns of a log of servos, in SI units."""

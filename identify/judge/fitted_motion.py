@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import final
 
 import numpy as np
 import scipy
@@ -22,7 +21,6 @@ SETTLING = 0.2  # Time over which loads are averaged that teeth of gears carry [
 SMALL = 1e-4  # Step of differences [rad, m, 1], small beside what robots move, large beside rounding
 
 
-@final
 @dataclass(frozen=True, eq=False)
 class FittedMotion:
     """A fitted robot along the motion of a log, at some instants of it."""

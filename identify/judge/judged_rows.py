@@ -1,7 +1,6 @@
 """The rows on which a fit is judged, and the noise in them."""
 
 from dataclasses import dataclass, replace
-from typing import final
 
 import numpy as np
 
@@ -40,7 +39,6 @@ def shares(rows: RowMap) -> Array:
     return np.asarray(rows.outside * rows.kernel.apply(rows.inside) / whole)
 
 
-@final
 @dataclass(frozen=True)
 class _WhereItMoves(AbstractMask):
     """Leaves out where joints reverse or rest, except those that rest all the time."""

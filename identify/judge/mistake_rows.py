@@ -3,7 +3,6 @@
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import final
 
 import numpy as np
 
@@ -35,7 +34,6 @@ LINE = 12.0
 """A spectral line of the residuals is this many times their median: of 1000 frequencies one is so by chance in 200 logs."""
 
 
-@final
 @dataclass(frozen=True, eq=False)
 class Candidate:
     """A mistake that may have been made, and its rows."""

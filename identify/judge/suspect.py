@@ -1,12 +1,10 @@
 """What a diagnosis finds."""
 
 from dataclasses import dataclass, field
-from typing import final
 
 from idbench.identify.arrays import Array
 
 
-@final
 @dataclass(frozen=True)
 class Suspect:
     """A mistake that would explain residuals."""

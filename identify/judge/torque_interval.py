@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import final
 
 import numpy as np
 
@@ -24,7 +23,6 @@ MOST = 0.99
 the fit itself is, and single peaks of noise do not widen it."""
 
 
-@final
 @dataclass(frozen=True, eq=False)
 class TorqueInterval:
     """Half widths of intervals of the torques of moving joints; all arrays have the shape (joint,)."""

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Self, final
+from typing import Self
 
 import numpy as np
 import numpy.typing as npt
@@ -21,7 +21,6 @@ BAND = 10.0  # Frequency [Hz] up to which torques are judged: what drives and co
 OF_NYQUIST = 0.4  # Share of the Nyquist frequency above which no band goes: filters and differences need room
 
 
-@final
 @dataclass(frozen=True, eq=False)
 class UsedRows:
     """The explicit model's rows of one log, without a mask."""

@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 from math import sqrt
-from typing import final
 
 import numpy as np
 import numpy.typing as npt
@@ -31,7 +30,6 @@ ROUNDING = 1e-12  # Share of the largest predicted torque below which one is rou
 HELD_OUT = 0.25  # Share of a log, at its end, that is held out where there is no second log
 
 
-@final
 @dataclass(frozen=True, eq=False)
 class Validation:
     """Torques measured and predicted at the rows of a chain, joint by joint; all arrays have the shape (joint,).

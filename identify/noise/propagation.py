@@ -20,7 +20,7 @@ At 100 Hz sigma of motions that are slow throughout is off by up to 13 %, at 200
 
 ALIASED = 0.01  # Share of a variance by which it may be off for being summed at few samples: 0.5 % of sigma
 TAIL = 1e-7
-"""Share of the energy of a response, at either end, that is left out. Slow motion is seen where next to no noise is left: with
+"""Share of the energy of a response, at either end, that is left out. Slow motion is seen where noise is least: with
 1e-4 its sigma is 1.7 times too small."""
 
 

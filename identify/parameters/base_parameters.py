@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
-from typing import Self, final
+from typing import Self
 
 import numpy as np
 
@@ -35,7 +35,6 @@ SPEED, ACCELERATION = 5.0, 25.0
 """Largest rates of the random states [rad/s, rad/s^2]: as heavy as gravity, so that no kind of column drowns."""
 
 
-@final
 @dataclass(frozen=True, eq=False)
 class BaseParameters:
     """The grouping of a basis: X_base = K X_standard, from the columns of the explicit model at random states.

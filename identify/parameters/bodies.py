@@ -1,7 +1,7 @@
 """Bodies that exist: positive pseudo-inertias of links, positive armatures and frictions, and a distance between them."""
 
 from collections.abc import Sequence
-from typing import NamedTuple, final
+from typing import NamedTuple
 
 import numpy as np
 
@@ -71,7 +71,6 @@ class Divergence(NamedTuple):
     """L^-T with L L' the Hessian, shape (p, p)."""
 
 
-@final
 class Bodies:
     """Standard parameters, and how far others are from them.
 

@@ -1,7 +1,6 @@
 """Physically consistent standard parameters that agree with an estimate of the base parameters."""
 
 from dataclasses import dataclass
-from typing import final
 
 import numpy as np
 import numpy.typing as npt
@@ -23,7 +22,6 @@ LARGER = 30.0
 """Times the size of the given bodies from which on an estimate says that these stand for bodies of an unknown size."""
 
 
-@final
 @dataclass(frozen=True, eq=False)
 class Consistent:
     """Physically consistent standard parameters."""

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import final
 
 import numpy as np
 import numpy.typing as npt
@@ -21,7 +20,6 @@ DECIDED = 0.1
 PLAIN = 1e-12  # Share of the largest variance that every combination is taken to have at least: more than that is rounding
 
 
-@final
 @dataclass(frozen=True, eq=False)
 class NormalPrior:
     """Values with standard deviations."""
@@ -53,7 +51,6 @@ class NormalPrior:
         return self.known
 
 
-@final
 @dataclass(frozen=True, eq=False)
 class FilePrior:
     """Links near those of a file: weight times the log-determinant divergence of `Bodies`, linearized at its minimum.
@@ -144,7 +141,6 @@ def evident_sizes(R: Array, groups: Sequence[npt.NDArray[np.intp]], sizes: Array
     return sizes
 
 
-@final
 @dataclass(frozen=True, eq=False)
 class PriorSum:
     """Several."""

@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass, replace
 from math import ceil
-from typing import final
 
 import numpy as np
 
@@ -24,7 +23,6 @@ from idbench.identify.signals.signals import Signals
 from idbench.identify.signals.torques import AbstractAlignment, AsLogged, ByChannel
 
 
-@final
 @dataclass(frozen=True)
 class Chain:
     """The stages between a log and Y = W X + rho; the same chain serves every sampling frequency."""

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, final
+from typing import NamedTuple
 
 import numpy as np
 from scipy.stats import wilcoxon
@@ -18,7 +18,6 @@ MIN_SHARE = 0.01  # Share of the samples from which on what a joint is doing is 
 SLOW = 0.05  # Speed below which a joint rests, as a share of the speed that it exceeds in 1 % of the samples
 
 
-@final
 class ServoLack(NamedTuple):
     """Residuals in one kind of motion."""
 
@@ -60,7 +59,6 @@ LEVEL = 0.05  # p value, of all comparisons together, below which a law is bette
 PER_PARAMETER = 2  # Parts of the log per parameter of the largest law, each predicted without it
 
 
-@final
 @dataclass(frozen=True, eq=False)
 class ServoFrictionChoice:
     """Laws of friction compared."""

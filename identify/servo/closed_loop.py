@@ -3,7 +3,7 @@
 import os
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import TYPE_CHECKING, Any, NamedTuple, final
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -22,7 +22,6 @@ SLOPE = 5.0
 STATES = 3  # Of the beginning of a run: position, speed, target
 
 
-@final
 class Begin(NamedTuple):
     """How a run begins."""
 
@@ -36,7 +35,6 @@ class Begin(NamedTuple):
 WAY = 6  # Ranges of its motion that a joint may cross in a step: beyond, it is lost, and numbers would overflow
 
 
-@final
 class ServoLoop:
     """Runs of one kind of servo, to be simulated with any parameters (see `idbench.identify.servo.servo_step`).
 

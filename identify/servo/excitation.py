@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Self, final
+from typing import Self
 
 import numpy as np
 
@@ -16,7 +16,6 @@ SCALES = ("a", "b", "Ia", "Fs", "Fv")  # Parameters of which one that is known s
 DEGREES = 20.0  # Times the range of the positions from which on commands are in another unit
 
 
-@final
 @dataclass(frozen=True)
 class Excitation:
     """Sizes of the motion of some runs."""

@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import final
 
 import numpy as np
 import numpy.typing as npt
@@ -24,7 +23,6 @@ CLUSTERS = 2  # Clusters per parameter: where there are fewer runs, or pieces of
 MIN_PARTS = 24  # Parts of a log by which scales are compared, at least, whatever the number of parameters
 
 
-@final
 @dataclass(frozen=True, eq=False)
 class ServoFit:
     """What was identified of a servo."""

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import NamedTuple, final
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,7 +20,6 @@ INSEPARABLE = 100.0
 """Condition number from which on offsets cannot be told apart: what gravity says of one, another can make up for."""
 
 
-@final
 class OffsetJoint(NamedTuple):
     """The fit of a joint, and the offsets of others that its loads assume."""
 

@@ -1,7 +1,7 @@
 """What is known of the loop that drives a joint: its firmware, its supply, its encoder."""
 
 from dataclasses import dataclass, fields
-from typing import NamedTuple, final
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,7 +12,6 @@ FREE = ("kind", "kp", "kd", "time_constant", "steps")  # What need not be above 
 HIGHEST = 1500.0  # Supply [V] above which millivolts are suspected: low voltage (IEC 61140) ends there for direct current
 
 
-@final
 class LoopKind(NamedTuple):
     """In what a loop commands."""
 
@@ -32,7 +31,6 @@ KINDS: dict[str, LoopKind] = {
 """What a loop may command: the duty of a chopper before a DC motor, a torque, or a current, which needs no back-EMF."""
 
 
-@final
 class TimeSteps(NamedTuple):
     """What an integrator of finite steps makes of a joint: damping that it takes late in a step acts as inertia."""
 
@@ -50,7 +48,6 @@ class TimeSteps(NamedTuple):
     """B, rate at which that friction slows what still moves [1/s]; 0: friction is as sharp as that of a joint."""
 
 
-@final
 class Published(NamedTuple):
     """A servo that others measured."""
 
@@ -75,7 +72,6 @@ PUBLISHED: dict[str, Published] = {
 GitHub kscalelabs/sysid; supplies by the makers' datasheets."""
 
 
-@final
 @dataclass(frozen=True)
 class Servo:
     """What is known of the loop that drives a joint.

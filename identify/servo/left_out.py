@@ -1,7 +1,6 @@
 """What a fit of a servo is without each of its parts: covariance of the parameters, errors of what was left out."""
 
 from dataclasses import dataclass
-from typing import final
 
 import numpy as np
 
@@ -18,7 +17,6 @@ correlated over longer times, as an offset is over all of a log, standard errors
 MOST_LEVERAGE = 0.99  # Of a cluster on its own fit: beyond, nothing is left of its residuals to say how they scatter
 
 
-@final
 @dataclass(frozen=True, eq=False)
 class LeftOut:
     """A fit without each of its clusters, from one step of the search (the jackknife)."""

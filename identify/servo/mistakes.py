@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import final
 
 import numpy as np
 from scipy.stats import wilcoxon
@@ -40,7 +39,6 @@ ROUNDS = 25  # Rounds of these: of a gain that is half of what it is, the first 
 AS_WELL = 0.8  # Share of what the best mistake explains from which on another one is named beside it
 
 
-@final
 @dataclass(frozen=True)
 class ServoMistake:
     """A mistake that explains residuals of a joint."""

@@ -1,7 +1,7 @@
 """The parameters of a servo: letters, units, limits, and how far a search steps."""
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple, final
+from typing import NamedTuple
 
 import numpy as np
 
@@ -46,7 +46,6 @@ def start_parameters(law: str, p: Mapping[str, float], speed: float) -> dict[str
     return {name: first[name] for name in SERVO_FRICTIONS[law]}
 
 
-@final
 class ServoParameter(NamedTuple):
     """One parameter."""
 

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from functools import cache
-from typing import final
 
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
@@ -64,7 +63,6 @@ LIGHTEST = 1e-6  # Inertia of a rotor of which rows show none, per torque: a sea
 COLUMNS = ("a", "b", "Ia", "Fs", "offset")
 
 
-@final
 class ServoRows:
     """Rows of runs on one clock each: J qdd + load = a V duty - b qd - Fs sign(qd) - Ia qdd + a V g kp offset.
 
@@ -119,7 +117,6 @@ class ServoRows:
         return float(np.mean((Y - W @ X) ** 2)), p
 
 
-@final
 class _Uniform:
     """A run on a uniform clock, low-passed."""
 

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Self, final
+from typing import Self
 
 import numpy as np
 import numpy.typing as npt
@@ -23,7 +23,6 @@ def _none() -> Array:
 G = 9.81  # Gravity of a pendulum on a bench [m/s^2]
 
 
-@final
 @dataclass(frozen=True, eq=False)
 class JointLoad:
     """The torque that the links need of one joint, J qdd + sine sin(q) + cosine cos(q) + rest, q being the angle of the file.
@@ -104,7 +103,6 @@ def without_spikes(t: Array, q: Array) -> Array:
     return np.interp(t, t[well], q[well])
 
 
-@final
 @dataclass(frozen=True, eq=False)
 class ServoRun:
     """Commands and positions of one joint, with their times as logged.

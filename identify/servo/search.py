@@ -6,7 +6,6 @@ steps mislead, wide ones, and samples spread as the normal equations say, go on.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import final
 
 import numpy as np
 from scipy.special import ndtri
@@ -30,7 +29,6 @@ AHEAD = 3.0  # Counts by which the beginning of a run may be off
 WILD = 4.0  # Times its typical size from which on the sensitivity of a sample counts less: of motions that depend on a hair
 
 
-@final
 @dataclass(frozen=True, eq=False)
 class Beginning:
     """How runs begin: the encoder says that to a count, and where torque is off nothing makes a run forget it."""
@@ -47,7 +45,6 @@ class Beginning:
         return Nuisances(self.sensitivity, self.certainty, w)
 
 
-@final
 @dataclass(frozen=True, eq=False)
 class Found:
     """The best parameters of a search."""
@@ -64,7 +61,6 @@ class Found:
     """Where runs begin."""
 
 
-@final
 class ServoSearch:
     """Minimizes the sum of Fair's function of the residuals, which grows like their size where they are large.
 
@@ -213,7 +209,6 @@ class ServoSearch:
         return np.concatenate([z, -z])
 
 
-@final
 class _Normal:
     """Weighted normal equations, in which every change of the parameters comes with the best beginnings of the runs.
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Self, final
+from typing import Self
 
 import numpy as np
 
@@ -28,7 +28,6 @@ STEP = 1e-3  # Shortest step of the last stage [s]: a tenth of the sampling time
 PLAYS = np.array([0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0])  # Backlash that is tried first [counts]
 
 
-@final
 class Stages:
     """Runs at work: from stage to stage with more parameters, and finer.
 

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from itertools import product
-from typing import final
 
 import numpy as np
 
@@ -26,7 +25,6 @@ NARROW = 3.0
 REFINED = 15  # Rounds of the last stage, at most
 
 
-@final
 class Valleys:
     """Searches that leave the valley where they are, if another one is deeper.
 

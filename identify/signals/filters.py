@@ -4,7 +4,7 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import lru_cache
 from math import floor
-from typing import Literal, final
+from typing import Literal
 
 import numpy as np
 import scipy
@@ -121,7 +121,6 @@ _WEIGHTS = {
 """Weights that are exact for polynomials of degree 2 and 6."""
 
 
-@final
 @dataclass(frozen=True)
 class CentralDifference(AbstractDifferentiator):
     """Central difference of order 2 (the paper's) or 6."""

@@ -3,7 +3,7 @@
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 from math import ceil
-from typing import Self, final
+from typing import Self
 
 import numpy as np
 import scipy
@@ -32,7 +32,6 @@ class AbstractMask(ABC):
         """Return weights between 0 and 1 of every joint's instants, shape (..., joint, time) like `qd` [rad/s]."""
 
 
-@final
 @dataclass(frozen=True)
 class NoMask(AbstractMask):
     """Keeps every instant."""
@@ -57,7 +56,6 @@ def slow_speed(qd: Array) -> Array:
     return np.maximum(np.maximum(own, NOISY * velocity_noise(qd)), MIN_SPEED)
 
 
-@final
 @dataclass(frozen=True)
 class ReversalMask(AbstractMask):
     """Leaves out the instants at which a joint rests or reverses, where its friction is not Fs sign(qd) + Fv qd.

@@ -5,7 +5,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import ceil
-from typing import final
 
 import numpy as np
 import scipy
@@ -43,7 +42,6 @@ class AbstractPrefilter(ABC):
         """
 
 
-@final
 @dataclass(frozen=True)
 class NoPrefilter(AbstractPrefilter):
     """Leaves positions and torques as they were logged."""
@@ -54,7 +52,6 @@ class NoPrefilter(AbstractPrefilter):
         return x
 
 
-@final
 @dataclass(frozen=True)
 class ButterworthPrefilter(AbstractPrefilter):
     """Butterworth low-pass, run forward and backward (section 6.2, Matlab's filtfilt)."""
@@ -84,7 +81,6 @@ def _sections(f: ButterworthPrefilter, fs: float) -> Array:
     return frozen(scipy.signal.butter(f.order, f.cutoff, fs=fs, output="sos"))
 
 
-@final
 @dataclass(frozen=True)
 class NoisePrefilter(AbstractPrefilter):
     """Low-pass, a sinc through a Kaiser window, of logs whose positions are noisy; none of others.

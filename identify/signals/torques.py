@@ -3,7 +3,7 @@
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple, final
+from typing import NamedTuple
 
 import numpy as np
 
@@ -40,7 +40,6 @@ accelerations for smooth within it, which they are not: an error of (w T)^2 time
 sampling period, or that of the controller: `TorqueChannel.period`."""
 
 
-@final
 @dataclass(frozen=True, eq=False)
 class Torque:
     """The measured torque at every sample instant, so that B tau = [c + s e] X is compared with itself."""
@@ -105,7 +104,6 @@ class AbstractAlignment(ABC):
         """
 
 
-@final
 @dataclass(frozen=True)
 class ByChannel(AbstractAlignment):
     """Takes the torque for what its channel says it is: instantaneous, held or averaged, with its delay."""
@@ -115,7 +113,6 @@ class ByChannel(AbstractAlignment):
         return Torque(tau, channel.meaning, channel.delay, fs, channel.period, channel.lags)
 
 
-@final
 @dataclass(frozen=True)
 class AsLogged(AbstractAlignment):
     """Takes sample k for the torque at t_k, whatever the channel says, as the paper does."""

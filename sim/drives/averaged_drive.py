@@ -1,7 +1,5 @@
 """A current-controlled DC motor, its chopper averaged away."""
 
-from typing import final
-
 import numpy as np
 
 from idbench.sim.drives.drive import AbstractAmplifier, AbstractDrive, Electric, Trace, every
@@ -22,7 +20,6 @@ def limits(robot: Robot, voltage: Limit, current: Limit) -> tuple[Array, Array]:
     return V, np.minimum(motors.I, per_joint(current or unlimited, n, "drive.current_limit"))
 
 
-@final
 @settings
 class AveragedDrive(AbstractDrive):
     """Current-controlled DC motor: winding, bus voltage and current limit; the current loop is of first order.

@@ -1,6 +1,6 @@
 """A drive that gives the commanded torque."""
 
-from typing import ClassVar, final
+from typing import ClassVar
 
 import numpy as np
 
@@ -10,7 +10,6 @@ from idbench.sim.robot.robot import Robot
 from idbench.sim.settings import settings
 
 
-@final
 @settings
 class IdealDrive(AbstractDrive):
     """Torque as asked: no winding, no limit, no lag."""

@@ -1,6 +1,6 @@
 """A servo: a position loop in firmware, a chopper averaged away, a DC motor and a gear inside the joint."""
 
-from typing import Annotated, Any, ClassVar, Literal, final
+from typing import Annotated, Any, ClassVar, Literal
 
 import mujoco
 import numpy as np
@@ -28,7 +28,6 @@ from idbench.sim.settings import (
 Interval = tuple[NotNegative, NotNegative]
 
 
-@final
 @settings
 class ServoDrive(AbstractDrive):
     """Position-controlled joint: duty = clip(gain kp (q_s - q - lead qd), limit), V duty = R i + K qd, torque = K i.

@@ -1,6 +1,6 @@
 """A DC motor behind an H-bridge chopper, the winding resolved between the edges of the pulses."""
 
-from typing import Annotated, final
+from typing import Annotated
 
 import numpy as np
 from pydantic import Field
@@ -17,7 +17,6 @@ from idbench.sim.robot.robot import Robot
 from idbench.sim.settings import EachPositiveOrNone, NotNegative, Number, Positive, Share, settings
 
 
-@final
 @settings
 class SwitchedDrive(AbstractDrive):
     """H-bridge chopper with a digital PI current loop; torque ripple emerges from its pulses.

@@ -5,7 +5,6 @@ One loop: plants start somewhere in the log, get its torques as its channel says
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import final
 
 import numpy as np
 import numpy.typing as npt
@@ -29,7 +28,6 @@ Feedback = Callable[[int, Plant], Array]
 """Torque beside that of the log at a sample [N m], shape (nsim, joint)."""
 
 
-@final
 @dataclass(frozen=True, eq=False)
 class Replay:
     """What a simulated robot does with the torques of a log."""

@@ -1,6 +1,6 @@
 """LuGre friction."""
 
-from typing import Annotated, final
+from typing import Annotated
 
 import numpy as np
 from mujoco.batch import Batch
@@ -12,7 +12,6 @@ from idbench.sim.robot.motors import Array
 from idbench.sim.settings import Number, Positive, settings
 
 
-@final
 @settings
 class LuGre(AbstractFrictionLaw):
     """LuGre: bristles that bend and slip; presliding, stiction and Stribeck in one (Canudas de Wit et al., 1995).
@@ -74,7 +73,6 @@ class _Contact(AbstractContact):
         return -(self._Fs * mean + fading * (self._z - z0) / self._h)
 
 
-@final
 @settings
 class Dahl(AbstractFrictionLaw):
     """Dahl: bristles that bend and slip, Coulomb friction with hysteresis (P. Dahl, AIAA Journal 14 (1976) 1675-1682).

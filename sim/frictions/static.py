@@ -1,7 +1,7 @@
 """Frictions that depend on the motion, the load or the temperature alone, not on what was before."""
 
 from dataclasses import field, fields, is_dataclass
-from typing import Annotated, final
+from typing import Annotated
 
 import numpy as np
 from mujoco.batch import Batch
@@ -21,7 +21,6 @@ SLOW, JUMP = 1e-9, 1e-6
 """Speed at which a joint is as good as at rest [rad/s], and change of a unit law over twice that which is a jump."""
 
 
-@final
 @settings
 class CoulombViscous(AbstractFrictionLaw):
     """Fs sign(qd) + Fv qd; near standstill MuJoCo's soft constraint decides."""
@@ -43,7 +42,6 @@ class _CoulombContact(AbstractContact):
         return 0.0
 
 
-@final
 @settings
 class Stribeck(AbstractFrictionLaw):
     """Stribeck: Fs (1 + (static - 1) exp(-(qd/velocity)^2)) sign(qd) + Fv qd."""
@@ -65,7 +63,6 @@ class Stribeck(AbstractFrictionLaw):
         return _LawContact(law, plant, Fs, (self.static - 1) * Fs)
 
 
-@final
 @settings
 class Law(AbstractFrictionLaw):
     """size g(q, qd) of a law that is identified, such as tanh or a law of one's own, beside Fs sign(qd) + Fv qd."""
@@ -130,7 +127,6 @@ class _LawContact(AbstractContact):
         return 0.0
 
 
-@final
 @settings
 class Asymmetric(AbstractFrictionLaw):
     """Forwards Fs + offset and Fv + difference, backwards Fs - offset and Fv - difference."""
@@ -169,7 +165,6 @@ class _AsymmetricContact(AbstractContact):
         return found
 
 
-@final
 @settings
 class LoadDependent(AbstractFrictionLaw):
     """(Fs + share |load|) sign(qd) + Fv qd, the load being all torque but friction, of gravity and inertia of links and rotors.
@@ -208,7 +203,6 @@ class _LoadContact(AbstractContact):
         return 0.0
 
 
-@final
 @settings
 class Warming(AbstractFrictionLaw):
     """Fs sign(qd) + (Fv + slope (T - reference)) qd while the drives warm up from `cold` to `warm`; T is in the log."""

@@ -3,7 +3,7 @@
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal, final
+from typing import Annotated, Any, Literal
 
 import mujoco
 import numpy as np
@@ -27,7 +27,6 @@ CLEARANCE = 0.01  # Least distance between shapes by default [m]; pairs that nev
 BOX = "keep_out {}"  # What a box is called beside them
 
 
-@final
 @settings
 class KeepOut:
     """A box that no part of the robot may enter, its edges along the axes of the world."""
@@ -46,7 +45,6 @@ class KeepOut:
             )
 
 
-@final
 @settings
 class MotionLimits:
     """What a motion must keep; what is not given is taken from the robot's file."""

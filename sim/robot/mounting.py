@@ -3,7 +3,6 @@
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import final
 
 import mujoco
 import numpy as np
@@ -14,7 +13,6 @@ from idbench.sim.errors import RobotError
 from idbench.sim.robot.motors import Array
 
 
-@final
 @dataclass(frozen=True)
 class Mounting:
     """How a robot is mounted, and which of its joints move."""

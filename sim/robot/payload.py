@@ -2,7 +2,7 @@
 
 from math import pi
 from pathlib import Path
-from typing import Annotated, final
+from typing import Annotated
 
 import mujoco
 from pydantic import Field
@@ -58,7 +58,6 @@ def with_play(spec: mujoco.MjSpec, play: Array, h: float) -> None:
         gap.solref_limit, gap.solimp_limit = [2 * h, 1.0], list(HARD)
 
 
-@final
 @settings
 class Payload:
     """A mass bolted to the last link. It is part of the truth, and unknown to the controller."""

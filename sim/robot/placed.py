@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import final
 
 import numpy as np
 
@@ -14,7 +13,6 @@ from idbench.sim.robot.robot import Robot
 BASE = "base"  # Name of the link that stands
 
 
-@final
 @dataclass(frozen=True)
 class Body:
     """Mass, centre of mass, and inertia about it, in the axes of a link's frame."""
@@ -43,7 +41,6 @@ class Body:
         return [float(x) for x in without_rounding(self.inertia[np.triu_indices(3)])]
 
 
-@final
 @dataclass(frozen=True)
 class PlacedLink:
     """A link, and the joint that it hangs on."""

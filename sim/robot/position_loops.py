@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, final
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -16,7 +16,6 @@ LOW_PASSES = (int(mujoco.mjtDyn.mjDYN_FILTER), int(mujoco.mjtDyn.mjDYN_FILTEREXA
 PLACES = {"R": 0, "K": 1, "kp": 4, "ki": 5, "kd": 6, "V": 7}  # Places of the parameters of a `dcmotor` among those of its gain
 
 
-@final
 @dataclass(frozen=True)
 class PositionLoop:
     """The loop of a joint, as the actuator of a file closes it: `position`, `velocity`, an affine `general`, or `dcmotor`."""

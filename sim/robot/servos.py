@@ -3,7 +3,6 @@
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import final
 from xml.etree import ElementTree
 
 import mujoco
@@ -35,7 +34,6 @@ SHARP_FRICTION = (1e-4, 1.0), (0.9999, 0.9999, 0.001, 0.5, 2.0)
 """MuJoCo's solref and solimp of dry friction that is as sharp as any step allows: its own lets a joint creep under its load."""
 
 
-@final
 @dataclass(frozen=True)
 class ServoValues:
     """A servo as MuJoCo has it."""
@@ -183,7 +181,6 @@ def _plain(servo: ServoValues, step: float) -> tuple[str, dict[str, str]]:
     return ("position", {"kp": repr(float(kp)), **found}) if kp else ("velocity", found)
 
 
-@final
 @dataclass(frozen=True, eq=False)
 class Commands:
     """What servos are sent."""

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Annotated, Literal, final
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field
@@ -25,7 +25,6 @@ from idbench.sim.settings import (
 )
 
 
-@final
 @settings
 class TorqueMeasurement:
     """What the log's torque is made of: the current reference, as in the paper (Eq. 13), or a measured current."""
@@ -96,7 +95,6 @@ class CurrentSensor:
 Harmonics = Annotated[tuple[Number, ...], Field(min_length=1)]
 
 
-@final
 @settings
 class Ripple:
     """Torque that depends on the rotor's position. PWM ripple is not here: it emerges from the switched drive."""

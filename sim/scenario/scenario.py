@@ -1,6 +1,6 @@
 """Everything that defines a run, from TOML or Python."""
 
-from typing import Annotated, Literal, final
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field
@@ -18,7 +18,6 @@ from idbench.sim.settings import NotNegative, Number, Positive, Seed, settings
 from idbench.sim.trajectories import AbstractTrajectory, Quintic
 
 
-@final
 @settings
 class Timing:
     """When things happen."""
@@ -35,7 +34,6 @@ class Timing:
             raise ScenarioError(f"delay = {self.delay:g} s must be below 1 s")
 
 
-@final
 @settings
 class Physics:
     """How the plant is integrated."""
@@ -51,7 +49,6 @@ class Physics:
         return 0.0 if self.integrator == "RK4" else 0.5
 
 
-@final
 @settings
 class Scenario:
     """A robot, a motion, and all that is imperfect about them."""

@@ -1,7 +1,7 @@
 """Finite Fourier series."""
 
 from dataclasses import dataclass
-from typing import Annotated, final
+from typing import Annotated
 
 import numpy as np
 from pydantic import Field
@@ -41,7 +41,6 @@ class FourierMotion(AbstractMotion):
         return Reference(fs, np.array(s.middle) + g * q, velocity * moves, acceleration * moves)
 
 
-@final
 @settings
 class Fourier(AbstractTrajectory):
     """A finite Fourier series, q = middle + sum over k of sines_k sin(2 pi k t / period) + cosines_k cos(2 pi k t / period)."""

@@ -1,6 +1,6 @@
 """Fifth-order point-to-point moves, given by waypoints and times."""
 
-from typing import Annotated, final
+from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
@@ -14,7 +14,6 @@ from idbench.sim.trajectories.point_to_point import PEAK_VELOCITY, PointToPoint,
 from idbench.sim.trajectories.trajectory import AbstractTrajectory
 
 
-@final
 @settings
 class Quintic(AbstractTrajectory):
     """Fifth-order point-to-point moves between given waypoints in given times."""
@@ -99,7 +98,6 @@ def draw_waypoint(
     )
 
 
-@final
 @settings
 class RandomMoves(AbstractTrajectory):
     """Fifth-order moves between random waypoints in random times."""
@@ -139,7 +137,6 @@ class RandomMoves(AbstractTrajectory):
         return at_rest(points, times, self.rest)
 
 
-@final
 @settings
 class RandomPace(AbstractTrajectory):
     """Fifth-order moves that fill a time: their number, times and room are random, as those of a class of motions.

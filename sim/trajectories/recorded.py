@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, final
+from typing import Annotated
 
 import numpy as np
 import scipy
@@ -69,7 +69,6 @@ def _absolute(file: str) -> str:
     return file if file == "example" else str(Path(file).absolute())
 
 
-@final
 @settings
 class Recorded(AbstractTrajectory):
     """The motion of a CSV file: planned positions that a controller has logged, or measured ones without their noise."""

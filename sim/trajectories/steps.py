@@ -1,7 +1,7 @@
 """Random steps and waves: what makes servos show themselves."""
 
 from dataclasses import dataclass
-from typing import Annotated, final
+from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
@@ -16,7 +16,6 @@ from idbench.sim.trajectories.quintic import draw_waypoint, room
 from idbench.sim.trajectories.trajectory import AbstractMotion, AbstractTrajectory, Reference
 
 
-@final
 @settings
 class RandomSteps(AbstractTrajectory):
     """Commands that jump to random positions and hold them there; some approach them by fifth-order moves instead."""

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Self, final
+from typing import Self
 
 import numpy as np
 from ruckig import InputParameter, Result, Ruckig, RuckigError, Trajectory
@@ -66,7 +66,6 @@ class JerkLimited(AbstractMotion):
         return Reference(fs, q, qd, qdd)
 
 
-@final
 @settings
 class TimeOptimal(AbstractTrajectory):
     """Time-optimal moves under limits of velocity, acceleration and jerk (ruckig), at rest in every waypoint."""

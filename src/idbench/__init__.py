@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from idbench.experiments.api.calls import load_robot as load_robot
     from idbench.experiments.api.calls import read_log as read_log
     from idbench.experiments.api.calls import simulate as simulate
-    from idbench.experiments.api.jobs import benchmark as benchmark
     from idbench.experiments.api.jobs import design as design
     from idbench.experiments.api.jobs import fit_gains as fit_gains
     from idbench.experiments.api.jobs import fit_payload as fit_payload
@@ -43,7 +42,7 @@ if TYPE_CHECKING:
 
 PLACES = {
     "experiments.api.calls": ("load_robot", "read_log", "fit", "simulate"),
-    "experiments.api.jobs": ("study", "fit_payload", "fit_gains", "fit_servos", "design", "benchmark", "table1", "table2"),
+    "experiments.api.jobs": ("study", "fit_payload", "fit_gains", "fit_servos", "design", "table1", "table2"),
     "experiments.api.results": ("Identification", "ParameterEstimate", "Score", "SimulatedRun"),
     "experiments.api.study_table": ("StudyTable",),
     "experiments.errors": ("ExperimentError",),

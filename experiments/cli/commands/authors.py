@@ -10,12 +10,12 @@ from idbench.experiments.contracts.contracts import found, keeps
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.program import program
 from idbench.experiments.results.page import new_page, stages_of
-from idbench.experiments.starters.starters import new_example, new_plugin, new_scenario, new_set, new_study
+from idbench.experiments.starters.starters import new_example, new_plugin, new_scenario, new_study
 
 
 def begin(options: New) -> None:
     """Write what to start from."""
-    folder = options.what in ("plugin", "example", "set")
+    folder = options.what in ("plugin", "example")
     page, out = new_page(), options.out or Path(options.name if folder else f"{options.name}.toml")
     if options.what == "scenario":
         new_scenario(options.name, options.like, out)
@@ -23,9 +23,6 @@ def begin(options: New) -> None:
     elif options.what == "study":
         new_study(options.name, out)
         how = f"{program()} study {out}"
-    elif options.what == "set":
-        then = f"{program()} benchmark {out}"
-        how = f"get the data, in {out}:\n{new_set(options.name, out).strip()}\nthen: {then}"
     elif options.what == "example":
         with stages_of("simulating an arm"):
             new_example(options.name, options.robot, out)

@@ -3,7 +3,6 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import final
 
 from rich.text import Text
 
@@ -20,7 +19,6 @@ from idbench.experiments.results.page import NOT_SAVED, Page
 from idbench.experiments.results.writing import Manifest, folder_for, write_text
 
 
-@final
 @dataclass(frozen=True, eq=False)
 class Shown:
     """An identification that is complete, and where it is shown."""

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar, final
+from typing import ClassVar
 
 from idbench.experiments.cli.app import command
 from idbench.experiments.cli.command import Command
@@ -32,7 +32,6 @@ class RecordedOptions(WrittenOptions):
 
 
 @command("run")
-@final
 @dataclass(frozen=True, kw_only=True)
 class RunCommand(jobs.RunRequest, RecordedOptions, Command, action="run:run"):
     """Simulate a scenario in closed loop, identify it with all models, and record it."""
@@ -48,7 +47,6 @@ class RunCommand(jobs.RunRequest, RecordedOptions, Command, action="run:run"):
 
 
 @command("identify")
-@final
 @dataclass(frozen=True, kw_only=True)
 class Identify(jobs.IdentifyRequest, RecordedOptions, Command, action="identify:identify"):
     """Identify a log, or several logs in one fit: columns t, q1, ..., tau1, ... in SI units, or as log.toml states."""
@@ -74,7 +72,6 @@ class Identify(jobs.IdentifyRequest, RecordedOptions, Command, action="identify:
 
 
 @command("table1")
-@final
 @dataclass(frozen=True, kw_only=True)
 class Table1Command(jobs.Table1Request, RecordedOptions, Command, action="paper:compare"):
     """Reproduce the paper's simulation comparison (Table 1) and record it."""
@@ -84,7 +81,6 @@ class Table1Command(jobs.Table1Request, RecordedOptions, Command, action="paper:
 
 
 @command("table2")
-@final
 @dataclass(frozen=True, kw_only=True)
 class Table2Command(jobs.Table2Request, RecordedOptions, Command, action="paper:table2"):
     """Repeat the paper's experiment (Table 2) on the virtual robot, and attribute its errors; takes two minutes."""
@@ -96,7 +92,6 @@ class Table2Command(jobs.Table2Request, RecordedOptions, Command, action="paper:
 
 
 @command("search")
-@final
 @dataclass(frozen=True, kw_only=True)
 class SearchCommand(Command, action="paper:search"):
     """Search a trajectory with the paper's condition numbers. (`idbench excite` designs better ones.)"""
@@ -110,7 +105,6 @@ class SearchCommand(Command, action="paper:search"):
 
 
 @command("excite")
-@final
 @dataclass(frozen=True, kw_only=True)
 class Excite(jobs.ExciteRequest, RecordedOptions, Command, action="excite:excite"):
     """Design an exciting trajectory within the robot's limits."""
@@ -120,7 +114,6 @@ class Excite(jobs.ExciteRequest, RecordedOptions, Command, action="excite:excite
 
 
 @command("payload")
-@final
 @dataclass(frozen=True, kw_only=True)
 class IdentifyPayload(jobs.PayloadRequest, WrittenOptions, Command, action="loads:payload"):
     """Identify what the gripper holds: mass, first moments, inertia, from logs with it and logs without it."""
@@ -130,7 +123,6 @@ class IdentifyPayload(jobs.PayloadRequest, WrittenOptions, Command, action="load
 
 
 @command("gains")
-@final
 @dataclass(frozen=True, kw_only=True)
 class IdentifyGains(jobs.GainsRequest, WrittenOptions, Command, action="loads:gains"):
     """Identify the torque constants of the drives, gears included, from logs of currents with and without a known payload.
@@ -140,7 +132,6 @@ class IdentifyGains(jobs.GainsRequest, WrittenOptions, Command, action="loads:ga
 
 
 @command("servo")
-@final
 @dataclass(frozen=True, kw_only=True)
 class IdentifyServo(jobs.ServoRequest, RecordedOptions, Command, action="servo:servo"):
     """Identify joints under position loops (servos, legs, MuJoCo's actuators) from commands and positions; write them."""
@@ -154,7 +145,6 @@ class IdentifyServo(jobs.ServoRequest, RecordedOptions, Command, action="servo:s
 
 
 @command("study")
-@final
 @dataclass(frozen=True, kw_only=True)
 class StudyCommand(jobs.StudyRequest, RecordedOptions, Command, action="study:study"):
     """Run a study: simulate a scenario over a grid and many seeds, and identify each run. Without a name: list the studies."""
@@ -163,16 +153,3 @@ class StudyCommand(jobs.StudyRequest, RecordedOptions, Command, action="study:st
     """Folder of the study. Default: runs/<study>."""
     yes: bool = False
     """Allow more than a hundred thousand runs."""
-
-
-@command("benchmark")
-@final
-@dataclass(frozen=True, kw_only=True)
-class Benchmark(jobs.BenchmarkRequest, WrittenOptions, Command, action="benchmark:benchmark"):
-    """Identify sets of real logs, and judge each on logs that it was not fitted to. Without a name: list the sets."""
-
-    out: Folder = None
-    """Folder of the results. Rows that it has already, of the same definition, files and version, are not made again. Torques
-    that other tools have put there (predicted-TOOL.npz) are judged. Default: runs/benchmark."""
-    force: bool = False
-    """Make all rows again, and replace files that idbench did not write."""

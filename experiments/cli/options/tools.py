@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal, final
+from typing import Annotated, Literal
 
 from idbench.experiments.cli.app import command
 from idbench.experiments.cli.command import Command
@@ -11,7 +11,6 @@ from idbench.experiments.requests.words import Delay, File, Folder, Hertz, Json,
 
 
 @command("view")
-@final
 @dataclass(frozen=True)
 class View(Command, action="view:view"):
     """Open the recording of a results folder in the rerun viewer, or overlay those of several."""
@@ -28,7 +27,6 @@ class View(Command, action="view:view"):
 
 
 @command("log")
-@final
 @dataclass(frozen=True)
 class ShowLog(Command, action="logs:show_log"):
     """Show the contents of a log: columns, units, rate, clock, ranges, noise, encoders. Needs no robot."""
@@ -48,7 +46,6 @@ class ShowLog(Command, action="logs:show_log"):
 
 
 @command("resample")
-@final
 @dataclass(frozen=True)
 class Resample(Command, action="logs:resample"):
     """Resample a log at a fixed frequency and repair its clock: repeated rows, jitter, missing samples, gaps."""
@@ -70,7 +67,6 @@ class Resample(Command, action="logs:resample"):
 
 
 @command("export")
-@final
 @dataclass(frozen=True)
 class Export(Command, action="logs:export"):
     """Write the logs of a results folder as CSV."""
@@ -84,7 +80,6 @@ class Export(Command, action="logs:export"):
 
 
 @command("device")
-@final
 @dataclass(frozen=True)
 class ShowDevice(Command, action="device:device"):
     """Print a servo that was identified from public logs, with standard errors, or list them; write it for MuJoCo."""
@@ -108,7 +103,6 @@ class ShowDevice(Command, action="device:device"):
 
 
 @command("robot")
-@final
 @dataclass(frozen=True)
 class DescribeRobot(Command, action="robot:describe"):
     """Show what is identifiable: joints, base parameters, and a torque budget."""
@@ -124,7 +118,6 @@ class DescribeRobot(Command, action="robot:describe"):
 
 
 @command("scenario")
-@final
 @dataclass(frozen=True)
 class WriteScenario(Command, action="scenario:write"):
     """Write a scenario to a file, with every setting explained. Without a name: list the shipped scenarios."""
@@ -138,13 +131,12 @@ class WriteScenario(Command, action="scenario:write"):
 
 
 @command("new")
-@final
 @dataclass(frozen=True)
 class New(Command, action="authors:begin"):
-    """Create a scenario, a study, a plug-in package (templates that run), an example arm with logs, or a set of public logs."""
+    """Create a scenario, a study, a plug-in package (templates that run), or an example arm with logs."""
 
-    what: Annotated[Literal["scenario", "study", "plugin", "example", "set"], Word(positional=True)]
-    """What to create. Of a set, of those that `idbench benchmark` lists, it is the definition; it says how to get the logs."""
+    what: Annotated[Literal["scenario", "study", "plugin", "example"], Word(positional=True)]
+    """What to create."""
     name: Annotated[str, Word(positional=True)]
     """Its name."""
     kind: Annotated[str, Word("KIND")] = "estimator"
@@ -159,7 +151,6 @@ class New(Command, action="authors:begin"):
 
 
 @command("check")
-@final
 @dataclass(frozen=True)
 class Check(Command, action="authors:check"):
     """Check whether a plug-in satisfies the contract of its kind."""
@@ -171,7 +162,6 @@ class Check(Command, action="authors:check"):
 
 
 @command("completion")
-@final
 @dataclass(frozen=True)
 class Completion(Command, action="completion:complete"):
     """Print a script for a shell, which then completes commands and options with the tab key.
@@ -190,7 +180,6 @@ class Completion(Command, action="completion:complete"):
 
 
 @command("list")
-@final
 @dataclass(frozen=True)
 class List(Command, action="list:list_plugins"):
     """List all parts that can be combined, built-in and plug-ins."""

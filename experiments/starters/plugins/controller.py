@@ -1,13 +1,10 @@
 """A controller: which torques it commands, sample by sample, for many simulations at once."""
 
-from typing import final
-
 from idbench.sim.controllers import AbstractController, AbstractLaw, Error, Task
 from idbench.sim.robot.motors import Array
 from idbench.sim.settings import Positive, settings
 
 
-@final
 @settings
 class Starter(AbstractController):
     """PD with the nominal robot's torque fed forward, u = tau_nominal(q_ref) + M (w^2 e + 2 w de/dt)."""

@@ -1,7 +1,5 @@
 """A drive: what stands between the commanded torque and that of the motor."""
 
-from typing import final
-
 import numpy as np
 
 from idbench.sim.drives.drive import AbstractAmplifier, AbstractDrive, Electric, Trace
@@ -10,7 +8,6 @@ from idbench.sim.robot.robot import Robot
 from idbench.sim.settings import Positive, settings
 
 
-@final
 @settings
 class Starter(AbstractDrive):
     """A torque that follows its command with a time constant."""

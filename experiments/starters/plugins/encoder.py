@@ -1,7 +1,6 @@
 """An encoder: what the controller sees, and logs, of a joint's position."""
 
 from collections.abc import Sequence
-from typing import final
 
 import numpy as np
 
@@ -10,7 +9,6 @@ from idbench.sim.robot.motors import Array
 from idbench.sim.settings import NotNegative, settings
 
 
-@final
 @settings
 class Starter(AbstractEncoder):
     """Positions with white noise, as of a resolver."""

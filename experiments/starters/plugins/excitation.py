@@ -1,7 +1,6 @@
 """A kind of motion that `idbench excite` designs: linear in its coefficients, at rest where it begins and ends."""
 
 from dataclasses import dataclass
-from typing import final
 
 import numpy as np
 
@@ -12,7 +11,6 @@ from idbench.identify.design.shapes import Shapes
 from idbench.sim.trajectories import Fourier
 
 
-@final
 @dataclass(frozen=True)
 class Starter(AbstractExcitation):
     """Sums of sin(k w t)^3 about any position: sines whose harmonics cancel velocity and acceleration at the ends."""

@@ -1,7 +1,5 @@
 """A friction of the simulated robot: how its joints resist beside MuJoCo's own Coulomb and viscous friction."""
 
-from typing import final
-
 import numpy as np
 from mujoco.batch import Batch
 
@@ -10,7 +8,6 @@ from idbench.sim.robot.motors import Array
 from idbench.sim.settings import NotNegative, settings
 
 
-@final
 @settings
 class Starter(AbstractFrictionLaw):
     """Coulomb and viscous friction, and drag that grows with the square of the velocity."""

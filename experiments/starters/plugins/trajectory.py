@@ -1,7 +1,5 @@
 """A trajectory: where the joints go, and when."""
 
-from typing import final
-
 import numpy as np
 
 from idbench.sim.robot.robot import Robot
@@ -10,7 +8,6 @@ from idbench.sim.trajectories.point_to_point import PointToPoint, at_rest
 from idbench.sim.trajectories.trajectory import AbstractTrajectory
 
 
-@final
 @settings
 class Starter(AbstractTrajectory):
     """All joints there and back, between a quarter and three quarters of their ranges."""

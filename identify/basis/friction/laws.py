@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar, final
+from typing import ClassVar
 
 import numpy as np
 
@@ -14,7 +14,6 @@ from idbench.identify.errors import require_positive
 from idbench.identify.signals.signals import State
 
 
-@final
 @dataclass(frozen=True)
 class ViscousFriction(AbstractFriction):
     """Viscous friction, Fv qd."""
@@ -29,7 +28,6 @@ class ViscousFriction(AbstractFriction):
         return qd
 
 
-@final
 @dataclass(frozen=True)
 class AsymmetricViscousFriction(AbstractFriction):
     """Asymmetric viscous friction, Fva |qd|: Fv + Fva forwards and Fv - Fva backwards; with `offset`, the asymmetric law."""
@@ -43,7 +41,6 @@ class AsymmetricViscousFriction(AbstractFriction):
         return np.abs(qd)
 
 
-@final
 @dataclass(frozen=True)
 class CoulombFriction(AbstractFriction):
     """Coulomb friction, Fs sign(qd)."""
@@ -61,7 +58,6 @@ class CoulombFriction(AbstractFriction):
 START, RANGE = 0.2, (0.01, 5.0)  # Velocity over which friction rises: where it is looked for first, and within [rad/s]
 
 
-@final
 @dataclass(frozen=True)
 class TanhFriction(AbstractFriction):
     """Ft tanh(qd/vt): Coulomb friction without its jump, in the place of it."""
@@ -79,7 +75,6 @@ class TanhFriction(AbstractFriction):
         return np.tanh(qd / self.vt)
 
 
-@final
 @dataclass(frozen=True)
 class ArctanFriction(AbstractFriction):
     """Fat 2/pi arctan(qd/vat): Coulomb friction without its jump, in the place of it; it rises longer than tanh."""
@@ -107,7 +102,6 @@ def arctan() -> ShapedFriction:
     return ShapedFriction(ArctanFriction(), (Shape("vat", "vat", "rad/s", START, RANGE),))
 
 
-@final
 @dataclass(frozen=True)
 class Cogging(AbstractJointLaw):
     """Cogging of a known period, Cs sin(periods q) + Cc cos(periods q)."""
@@ -129,7 +123,6 @@ class Cogging(AbstractJointLaw):
         return {"Cs": np.sin(self.periods * state.q), "Cc": np.cos(self.periods * state.q)}
 
 
-@final
 @dataclass(frozen=True)
 class TemperatureFriction(AbstractJointLaw):
     """Friction that changes with the logged temperature T, (FvT qd + FsT sign(qd)) (T - reference)."""
@@ -147,7 +140,6 @@ class TemperatureFriction(AbstractJointLaw):
         return {"FvT": above * state.qd, "FsT": above * np.sign(state.qd)}
 
 
-@final
 @dataclass(frozen=True)
 class Offset(AbstractFriction):
     """Constant torque, off: an amplifier's offset, or Coulomb friction that differs with the direction."""

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Self, final
+from typing import Self
 
 import numpy as np
 
@@ -14,7 +14,6 @@ from idbench.identify.data.kinematics import Coupling
 from idbench.identify.signals.signals import State
 
 
-@final
 @dataclass(frozen=True, eq=False)
 class TiedFriction(AbstractBlock):
     """Coulomb friction between joints that one motor drives: each resists as the others turn, Fsx sign(qd6) on joint 5.
@@ -54,7 +53,6 @@ class TiedFriction(AbstractBlock):
         return Parameter("Fsx", None, "friction", "N m", self.coupling.name)
 
 
-@final
 @dataclass(frozen=True)
 class LoadFriction(AbstractJointLaw):
     """Friction in proportion to the torque that a joint carries, Fl |load| sign(qd).

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Any, ClassVar, NamedTuple, Self, final
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
@@ -40,7 +40,6 @@ class Shape(NamedTuple):
         return tuple(float(x) for x in np.geomspace(*self.range, count))
 
 
-@final
 @dataclass(frozen=True)
 class ShapedFriction(AbstractJointLaw):
     """A friction law F g(qd; b) with unknown shapes b, linearized at their operating point.
@@ -126,7 +125,6 @@ def _joints(n: int, X: Array, letters: str, known: Mapping[Parameter, Array | No
     return found
 
 
-@final
 @dataclass(frozen=True)
 class PowerFriction(AbstractFriction):
     """Fp |qd|^exponent sign(qd): below 1, as of greased gears, it flattens at speed; in the place of viscous friction."""
@@ -148,7 +146,6 @@ def power() -> ShapedFriction:
     return ShapedFriction(PowerFriction(), (Shape("exponent", "ap", "1", 0.5, (0.1, 2.0)),))
 
 
-@final
 @dataclass(frozen=True)
 class StribeckFriction(AbstractFriction):
     """What friction near standstill has above that of sliding, Fst exp(-(|qd|/vs)^exponent) sign(qd).

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar, final
+from typing import ClassVar
 
 import numpy as np
 
@@ -18,7 +18,6 @@ CENTRES = tuple(float(x) for x in np.linspace(-4, 4, 17))
 WIDTH = 0.5  # Width of a bump, which is their distance
 
 
-@final
 @dataclass(frozen=True)
 class SmoothFriction(AbstractJointLaw):
     """Friction as a smooth function of velocity, sum over k of u_k exp(-(asinh(qd/v) - c_k)^2 / (2 w^2)), beside other laws.

@@ -2,7 +2,7 @@
 
 import warnings
 from dataclasses import dataclass, replace
-from typing import ClassVar, Self, final
+from typing import ClassVar, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -27,7 +27,6 @@ MIN_DEVIATION = 0.1  # Standard deviation of a row at least, over the median of 
 SETTLED = 1e-3  # Step, in sigma of the paper's formula, below which parameters count as settled
 
 
-@final
 @dataclass(frozen=True)
 class IterativelyReweighted(AbstractEstimator):
     """Iteratively reweighted least squares (IRLS): joints weighted together, outliers left out.

@@ -1,7 +1,7 @@
 """Generalized least squares."""
 
 from dataclasses import dataclass
-from typing import ClassVar, final
+from typing import ClassVar
 
 import numpy as np
 
@@ -14,7 +14,6 @@ from idbench.identify.estimators.solution import OfWhitenedRows
 from idbench.identify.rows.factors import Factor, Status, prior_rows
 
 
-@final
 @dataclass(frozen=True)
 class OrdinaryLeastSquares(AbstractEstimator):
     """Ordinary least squares, X = argmin |Y - W X|^2, by QR (section 5)."""
@@ -28,7 +27,6 @@ class OrdinaryLeastSquares(AbstractEstimator):
         return Estimate.of_fit(problem, problem.factors.fit(), scaled=False)
 
 
-@final
 @dataclass(frozen=True)
 class WeightedLeastSquares(AbstractEstimator):
     """Weighted least squares (IDIM-WLS): rows divided by their noise, which the residuals of each joint give.
@@ -54,7 +52,6 @@ class WeightedLeastSquares(AbstractEstimator):
         return Estimate.of_fit(problem, problem.scaled_factors.fit(self.rounds), scaled=True)
 
 
-@final
 @dataclass(frozen=True)
 class GeneralizedLeastSquares(AbstractEstimator):
     """Generalized least squares (GLS), X = argmin (Y - W X)' C^-1 (Y - W X), with C the covariance that noise gives the rows.

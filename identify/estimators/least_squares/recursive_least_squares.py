@@ -1,7 +1,7 @@
 """Recursive least squares: the estimate as the rows come in, and one that forgets."""
 
 from dataclasses import dataclass
-from typing import ClassVar, final
+from typing import ClassVar
 
 import numpy as np
 
@@ -15,7 +15,6 @@ from idbench.identify.estimators.solution import Given
 from idbench.identify.rows.factors import Factor, Status
 
 
-@final
 @dataclass(frozen=True)
 class RecursiveLeastSquares(AbstractEstimator):
     """Recursive least squares (RLS) that forgets: its last estimate, as a controller has it that adapts while it moves.

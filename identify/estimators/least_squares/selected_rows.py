@@ -1,7 +1,7 @@
 """Least squares of the most informative rows."""
 
 from dataclasses import dataclass
-from typing import ClassVar, final
+from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -18,7 +18,6 @@ from idbench.identify.rows.operators.windows import AbstractWeakForm
 RIDGE = 1e-9  # Initial information about every parameter, as a share of that of all rows; it regularizes the first p selections
 
 
-@final
 @dataclass(frozen=True)
 class SelectedRows(AbstractEstimator):
     """Ordinary least squares of selected rows (OLS-selected): a D-optimal set of windows that do not overlap.

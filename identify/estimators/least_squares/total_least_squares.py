@@ -1,7 +1,7 @@
 """Total least squares."""
 
 from dataclasses import dataclass, replace
-from typing import ClassVar, final
+from typing import ClassVar
 
 import numpy as np
 
@@ -21,7 +21,6 @@ ROUNDING = 1e-15  # Share of the trace of a covariance that is added to its diag
 FLOOR = 1e-9  # Standard deviation of noise [rad] that counts as none
 
 
-@final
 @dataclass(frozen=True)
 class TotalLeastSquares(AbstractEstimator):
     """Mixed total least squares (TLS), scaled by the noise of [W Y]: the smallest change of both that lets them agree.

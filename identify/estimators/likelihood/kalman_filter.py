@@ -1,7 +1,7 @@
 """Unscented Kalman filter of states and parameters."""
 
 from dataclasses import dataclass
-from typing import ClassVar, final
+from typing import ClassVar
 
 import numpy as np
 
@@ -34,7 +34,6 @@ UNSURE = 10.0
 FASTEST = 100.0  # Uncertainty of the first velocity [rad/s] at most
 
 
-@final
 @dataclass(frozen=True)
 class UnscentedKalmanFilter(AbstractEstimator):
     """Unscented Kalman filter (UKF) of positions, velocities and parameters together, one pass over the log.

@@ -1,7 +1,7 @@
 """Maximum likelihood of motion and parameters together."""
 
 from dataclasses import dataclass, replace
-from typing import ClassVar, NamedTuple, final
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 import scipy
@@ -110,14 +110,13 @@ APART = 3.0  # The same where its own sigma is below the share `SMALL` of that e
 SMALL = 1e-2  # Share of sigma below which a fit claims to know far more than the estimate that it began with
 
 NOTHING = 0.9
-"""Share of the rms torque above which noise that is found leaves nothing to the motion: less than a fifth of its square."""
+"""Share of the rms torque of all joints above which noise that is found leaves nothing to the motion: less than a fifth of its square."""
 
 FINE = 0.02  # Change of the sigmas from one set of levels to the next at which reversals are used up: they come slowly
 WORTH = 0.9  # Typical sigma, over that of a fit without reversals, below which these are used
 MAX_BYTES = 2e9  # Bytes that the equations of all motions may take
 
 
-@final
 @dataclass(frozen=True)
 class MaximumLikelihood(AbstractEstimator):
     """Maximum likelihood (ML) of motion and parameters together, from positions and torques as they were logged.
@@ -193,7 +192,7 @@ class MaximumLikelihood(AbstractEstimator):
             again = GeneralizedLeastSquares().solve(Problem(tuple(later), problem.basis, problem.model, problem.chain))
             X, sigma = again.X, again.own_sigma
         _require_near(found, X, sigma, problem.names)
-        if (found.levels.torque > NOTHING * rms).all():
+        if np.linalg.norm(found.levels.torque) > NOTHING * np.linalg.norm(rms):
             raise IdentificationError(f"the motion explains none of the torques, which look like noise: {CHECK}")
         return found
 

@@ -1,7 +1,7 @@
 """Closed-loop output error (CLOE)."""
 
 from dataclasses import dataclass
-from typing import ClassVar, final
+from typing import ClassVar
 
 import numpy as np
 
@@ -16,7 +16,6 @@ from idbench.identify.estimators.simulating.row_products import Kinds
 from idbench.identify.estimators.simulating.simulated_rounds import AbstractSimulating, rates, require_explicit
 
 
-@final
 @dataclass(frozen=True)
 class ClosedLoopInputError(AbstractSimulating):
     """Closed-loop input error (CLIE), X = argmin |tau - tau_s(X)|^2, with tau_s the torques of the robot in its closed loop.
@@ -43,7 +42,6 @@ class ClosedLoopInputError(AbstractSimulating):
         return rounds.estimate(found, calibrated=scatter(found, kinds, rates(problem)))
 
 
-@final
 @dataclass(frozen=True)
 class ClosedLoopOutputError(AbstractSimulating):
     """Closed-loop output error (CLOE), X = argmin |q - q_s(X)|^2, with q_s the positions of the robot in its closed loop.

@@ -1,7 +1,7 @@
 """Instrumental variables."""
 
 from dataclasses import dataclass
-from typing import ClassVar, final
+from typing import ClassVar
 
 from idbench.identify.arrays import Array
 from idbench.identify.estimators.estimate import Estimate
@@ -14,7 +14,6 @@ from idbench.identify.estimators.simulating.steps import SecantSteps
 from idbench.identify.estimators.solution import Given
 
 
-@final
 @dataclass(frozen=True)
 class DirectInverse(AbstractSimulating):
     """Direct and inverse dynamic identification (DIDIM): least squares of the measured torques on the simulated robot's rows.
@@ -43,7 +42,6 @@ class DirectInverse(AbstractSimulating):
         return rounds.estimate(found, calibrated=scatter(found, kinds, rates(problem)))
 
 
-@final
 @dataclass(frozen=True)
 class InstrumentalVariables(AbstractSimulating):
     """Instrumental variables (IDIM-IV), X = (Z' w^2 W)^-1 Z' w^2 Y, with Z the rows of the simulated robot.

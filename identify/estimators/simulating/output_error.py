@@ -1,7 +1,7 @@
 """Output error by multiple shooting."""
 
 from dataclasses import dataclass
-from typing import ClassVar, final
+from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -21,7 +21,6 @@ STEP_Q, STEP_QD = 1e-5, 1e-4  # Changes of a state at the beginning of a segment
 LOST = 0.5  # Share of segments that may fail
 
 
-@final
 @dataclass(frozen=True)
 class OutputError(AbstractSimulating):
     """Output error (OE) by multiple shooting: the robot driven by the logged torques, X = argmin |q - q_s(X)|^2.

@@ -1,7 +1,5 @@
 """Rounds X -> G(X) of an estimator that simulates: how far they still have to go, and where to go on."""
 
-from typing import final
-
 import numpy as np
 
 from idbench.identify.arrays import Array
@@ -28,7 +26,6 @@ class Steps:
         return _largest((G - X) / unit), G
 
 
-@final
 class SecantSteps(Steps):
     """Rounds that leave a share of what was left, each direction its own.
 

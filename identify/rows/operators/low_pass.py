@@ -82,7 +82,6 @@ def decimation(share: float, cutoff: float, fs: float) -> int:
     return max(1, floor(share * fs / 2 / cutoff + 1e-9))  # 0.8 * 50 / 4 must not round down to 9
 
 
-@final
 @dataclass(frozen=True)
 class FirLowPass(AbstractLowPass):
     """Windowed-sinc low-pass and decimation by n_d = (fs/2) / cutoff, the paper's rule for a FIR filter (section 6.2).
@@ -125,7 +124,6 @@ def _taps(half: int, cutoff: float, fs: float) -> Array:
     return frozen(windowed_sinc(2 * half + 1, cutoff, fs))
 
 
-@final
 @dataclass(frozen=True)
 class IirLowPass(AbstractLowPass):
     """Chebyshev low-pass run forward and backward, and decimation by n_d = 0.8 (fs/2) / cutoff (section 6.2).

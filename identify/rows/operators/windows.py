@@ -13,7 +13,6 @@ from idbench.identify.rows.operators.low_pass import SEEN, AbstractLowPass, Abst
 from idbench.identify.rows.row_map import Grid, Kernel, RowMap, Window
 
 
-@final
 @dataclass(frozen=True)
 class Samples(AbstractLowPass):
     """No filter: every sample is a row, with all the noise that derivatives make."""
@@ -83,7 +82,6 @@ class AbstractWeakForm(AbstractOperator):
         return self.kernels(fs).integral
 
 
-@final
 @dataclass(frozen=True)
 class Windows(AbstractWeakForm):
     """Integrals over windows [ta, tb]: power becomes the energy model (Eq. 11, 20), implicit its integral form."""
@@ -132,7 +130,6 @@ def _simpson(intervals: int) -> Array:
     return weights
 
 
-@final
 @dataclass(frozen=True)
 class ModulatingFunctions(AbstractWeakForm):
     """Products with phi(t) = (1 - (t/H)^2)^degree over |t| < H, of unit area: the weak form, beyond the paper.

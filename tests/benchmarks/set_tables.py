@@ -9,8 +9,6 @@ from matplotlib.figure import Figure
 from rich.console import Console
 from rich.text import Text
 
-from idbench.experiments.reports.drawn import svg
-from idbench.experiments.reports.figures import rendered
 from idbench.experiments.text import JOINTS, new_table, percentage, print_table
 from idbench.identify import Array
 
@@ -150,7 +148,6 @@ def remarks(row: Row) -> Iterator[str]:
     for tool, found in row["tools"].items():
         yield from (f"{tool}: {part['failure']}" for part in (found, *found.get("logs", ())) if "failure" in part)
     yield from row.get("verdicts", ())
-    yield from [f"not saved: {row['unsaved']}"] if "unsaved" in row else []
     yield from (beside_published(row, one) for one in row["published"])
 
 
@@ -222,28 +219,6 @@ def shares(row: Row) -> dict[str, list[float]]:
 def shares_of_sets(rows: Sequence[Row]) -> list[tuple[str, Mapping[str, Sequence[float]]]]:
     """Return titles of sets that have torques, and the errors of each joint over its torque [%], by tool."""
     return [(row["title"], shares(row)) for row in rows if row_measure(row) is TORQUE]
-
-
-def report(rows: Sequence[Row], failures: Mapping[str, str]) -> str:
-    """Return the page of some rows, and why other sets have none."""
-    return rendered(
-        "idbench.experiments.benchmark",
-        "report.html.j2",
-        heads=[head.replace("\n", " ") for head in HEADS],
-        overview=list(overview(rows)),
-        failures=failures,
-        figure=svg(errors_figure(sets)) if (sets := shares_of_sets(rows)) else "",
-        sets=[
-            {
-                "title": row["title"],
-                "measure": row_measure(row).words,
-                "joints": row["joints"],
-                "tools": list(of_tools(row)),
-                "remarks": list(remarks(row)),
-            }
-            for row in rows
-        ],
-    )
 
 
 def errors_figure(sets: Sequence[tuple[str, Mapping[str, Sequence[float]]]]) -> Figure:

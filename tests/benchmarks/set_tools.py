@@ -3,15 +3,15 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, final
+from typing import Any
 from xml.etree import ElementTree
 from zipfile import BadZipFile
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from idbench.experiments.benchmark.set_fit import SetFit
 from idbench.experiments.errors import ExperimentError
+from idbench.experiments.identification.fit import Fit
 from idbench.experiments.judgement.held_out import HeldOut
 from idbench.experiments.results.writing import finite
 from idbench.identify import Array, MotionLog, Problem, TorqueChannel, validate
@@ -22,9 +22,8 @@ from idbench.sim.robot.urdf import parsed
 from idbench.sim.robot.write_urdf import urdf_text
 
 
-def what_tools_read(made: SetFit) -> dict[str, Any]:
-    """Return what other tools need to know beside logs and URDF."""
-    fit = made.fit
+def what_tools_read(fit: Fit) -> dict[str, Any]:
+    """What other tools need to know beside logs and URDF."""
     return {
         "robot": "robot.urdf",
         "joints": list(fit.robot_model.robot.joints),
@@ -37,10 +36,9 @@ def what_tools_read(made: SetFit) -> dict[str, Any]:
     }
 
 
-def write_for_tools(made: SetFit, folder: Path) -> None:
-    """Write logs, with torques at the instants when they act, and the robot."""
-    fit = made.fit
-    told = fit.logs.fitted if made.definition.delay_told else [_undelayed(log) for log in fit.logs.fitted]
+def write_for_tools(fit: Fit, delay_told: bool, folder: Path) -> None:
+    """Write logs, with torques at the instants when they act if `delay_told`, and the robot."""
+    told = fit.logs.fitted if delay_told else [_undelayed(log) for log in fit.logs.fitted]
     for k, log in enumerate(told):
         _write_arrays(folder / f"fit{k + 1}.npz", prepared(log))
     for k, log in enumerate((fit.logs.held_out or {}).values()):
@@ -98,7 +96,6 @@ def at_times(t: Array, times: Array, tau: Array) -> Array:
 PREDICTED = "predicted-*.npz"  # Names of the files of other tools, in the folder of a set's results
 
 
-@final
 @dataclass(frozen=True)
 class Predicted:
     """What a tool has predicted."""
