@@ -110,7 +110,7 @@ APART = 3.0  # The same where its own sigma is below the share `SMALL` of that e
 SMALL = 1e-2  # Share of sigma below which a fit claims to know far more than the estimate that it began with
 
 NOTHING = 0.9
-"""Share of the rms torque of all joints above which noise that is found leaves nothing to the motion: less than a fifth of its square."""
+"""Share of the rms torque of all joints above which noise leaves nothing to the motion: less than a fifth of its square."""
 
 FINE = 0.02  # Change of the sigmas from one set of levels to the next at which reversals are used up: they come slowly
 WORTH = 0.9  # Typical sigma, over that of a fit without reversals, below which these are used

@@ -1,4 +1,4 @@
-"""FIGAROH on the logs that `idbench benchmark` has left in its folders, as its own examples use it.
+"""FIGAROH on the logs that `public_sets.py` has left in its folders, as its own examples use it.
 
     uv venv figaroh && uv pip install -p figaroh figaroh==1.0.2
     figaroh/bin/python tests/benchmarks/peers/figaroh_tool.py runs/benchmark
@@ -6,7 +6,7 @@
 Settings are those of its UR10 example: friction, rotors and offsets; a Butterworth filter of the positions at a tenth of the
 sampling frequency; decimation by 10, or less for slow logs; its weighted least squares. Where that leaves noise in the
 accelerations, a lower cut-off does better, which its examples leave to the user: 5 times the cut-off of our rows, as "tuned".
-Torques of the held-out logs go into predicted-figaroh.npz and predicted-figaroh-tuned.npz; `idbench benchmark` judges them.
+Torques of the held-out logs go into predicted-figaroh.npz and predicted-figaroh-tuned.npz; `public_sets.py` judges them.
 Beside them are the estimate, its sigma, and `exact`, which fits the moving joints of the last held-out log: of a log without
 noise, the truth.
 """

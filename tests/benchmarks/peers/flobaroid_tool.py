@@ -1,11 +1,11 @@
-"""FloBaRoID on the logs that `idbench benchmark` has left in its folders, as its configuration for a fixed arm advises.
+"""FloBaRoID on the logs that `public_sets.py` has left in its folders, as its configuration for a fixed arm advises.
 
     git clone https://github.com/kjyv/FloBaRoID && git -C FloBaRoID checkout 9c06804
     uv venv flo && uv pip install -p flo idyntree numpy scipy sympy cvxpy clarabel pyyaml colorama palettable humanize tqdm \\
         jinja2 matplotlib trimesh plotly
     flo/bin/python tests/benchmarks/peers/flobaroid_tool.py FloBaRoID runs/benchmark
 
-Torques of the held-out logs go into predicted-flobaroid.npz, and `idbench benchmark` judges them. Beside them are the estimate,
+Torques of the held-out logs go into predicted-flobaroid.npz, and `public_sets.py` judges them. Beside them are the estimate,
 its sigma, and `exact`, which fits the moving joints of the last held-out log: of a log without noise, the truth.
 """
 

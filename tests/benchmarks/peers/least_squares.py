@@ -1,10 +1,10 @@
-"""Careful least squares with pinocchio's regressor, on the logs that `idbench benchmark` has left in its folders.
+"""Careful least squares with pinocchio's regressor, on the logs that `public_sets.py` has left in its folders.
 
     uv run --group test python tests/benchmarks/peers/least_squares.py runs/benchmark
 
 Positions are filtered without delay and differentiated; torques and columns are filtered alike and thinned out; rows where the
 joint is slow are left out; joints are weighted by their residuals, in turns; columns are reduced to those that are independent.
-Torques of the held-out logs, from filtered positions, go into predicted-pinocchio.npz; `idbench benchmark` judges them. Beside
+Torques of the held-out logs, from filtered positions, go into predicted-pinocchio.npz; `public_sets.py` judges them. Beside
 them are the estimate, its sigma, and `exact`, which fits the moving joints of the last held-out log: of one without noise,
 the truth.
 """

@@ -1,4 +1,4 @@
-"""`mujoco.sysid` on simulated SCARAs that `idbench benchmark` has in its folders; other robots have too many parameters for it.
+"""`mujoco.sysid` on simulated SCARAs that `public_sets.py` has in its folders; other robots have too many parameters for it.
 
     uv run --group benchmark python tests/benchmarks/peers/mujoco_tool.py runs/simulated/scara-*-[0-2]
 

@@ -1,7 +1,7 @@
-"""Sets of simulated logs, whose truth is known, for `idbench benchmark` and the other tools.
+"""Sets of simulated logs, whose truth is known, for `public_sets.py` and the other tools.
 
     uv run python tests/benchmarks/peers/simulated.py sets --seeds 20
-    uv run idbench benchmark sets/* --out runs/simulated
+    uv run python tests/benchmarks/public_sets.py sets/* --out runs/simulated
 
 Of each of three arms, with each imperfection and each seed: a log to fit, and one motion of the same arm without noise, held
 out, so that errors are those of the parameters alone. Other tools do not get the delay that idbench estimates: to find it is
