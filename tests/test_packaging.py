@@ -1,7 +1,9 @@
 """What the project says of itself agrees with itself."""
 
 import re
+import shutil
 import subprocess
+import sys
 import tomllib
 from importlib.metadata import version
 
@@ -41,3 +43,22 @@ def test_no_registry_and_no_machine_is_named(root):
         assert name != "uv.lock"
         if path.suffix not in {".png", ".webp", ".rrd", ".parquet"} and path.is_file():
             assert not pattern.search(path.read_text()), name
+
+
+def test_a_checkout_without_links_is_complete(root, tmp_path):
+    """As Git for Windows makes it: links are text files. Without the folders that they name it says what is missing."""
+    package = tmp_path / "src" / "idbench"
+    package.mkdir(parents=True)
+    shutil.copy(root / "src" / "idbench" / "__init__.py", package)
+    for name in ("experiments", "identify", "models", "sim"):
+        (package / name).write_text(f"../../{name}")
+    code = "import idbench, idbench.sim; print(idbench.fit.__module__, idbench.sim.__file__)"
+
+    def imported():
+        env = {"PYTHONPATH": str(tmp_path / "src")}
+        return subprocess.run([sys.executable, "-c", code], env=env, cwd=tmp_path, capture_output=True, text=True, check=False)
+
+    assert f"there is no folder sim in {package}" in imported().stderr
+    for name in ("experiments", "identify", "models", "sim"):
+        shutil.copytree(root / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
+    assert str(tmp_path / "sim") in imported().stdout

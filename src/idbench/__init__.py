@@ -11,6 +11,7 @@ robots that ship.
 """
 
 from importlib import import_module
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -39,6 +40,14 @@ if TYPE_CHECKING:
     from idbench.sim import load_scenario as load_scenario
     from idbench.sim.errors import BenchError as BenchError
     from idbench.sim.scenario.scenario import Scenario as Scenario
+
+if not (Path(__file__).parent / "sim").is_dir():  # a checkout whose links are text files, as Git for Windows writes them
+    root = Path(__file__).parents[2]
+    if not (root / "sim").is_dir():
+        raise ImportError(
+            f"there is no folder sim in {Path(__file__).parent}, nor in {root}: idbench is incomplete, install it again"
+        )
+    __path__.append(str(root))
 
 PLACES = {
     "experiments.api.calls": ("load_robot", "read_log", "fit", "simulate"),
