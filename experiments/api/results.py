@@ -130,9 +130,14 @@ class Identification:
         return checks(self.judgement, delay=self.delay_given)
 
     @property
+    def answer(self) -> tuple[str, str]:
+        """The verdict on held-out data in a sentence, and the next step."""
+        return conclusion(self.judgement, self.doubts)
+
+    @property
     def verdict(self) -> str:
         """The verdict on held-out data in one sentence, and what to check first."""
-        return "; ".join(conclusion(self.judgement, self.doubts))
+        return "; ".join(self.answer)
 
     def predict(
         self, q: Array, qd: Array, qdd: Array, model: str | None = None, *, interval: float | None = None
@@ -241,7 +246,7 @@ class Identification:
         from idbench.experiments.reports.page import report
 
         with Attempts("the fit is kept") as attempts:
-            text = report(self.judgement, self.doubts, self.fit.logs.notes, "idbench.fit(...)", attempts)
+            text = report(self.judgement, self.answer, self.doubts, self.fit.logs.notes, "idbench.fit(...)", attempts)
             write_text(Path(path), text, "report", force=force)
 
     def summary(self) -> dict[str, Any]:

@@ -11,6 +11,7 @@ import numpy as np
 from idbench.experiments.identification.consistent_estimate import drawn_about
 from idbench.experiments.identification.fit import Fit
 from idbench.experiments.judgement.held_out import HeldOut, on_log
+from idbench.experiments.note import Note
 from idbench.identify import Array, Estimate, IdentificationError, MotionLog
 from idbench.identify.telling import stage
 from idbench.sim.engine.driven import shoot
@@ -112,7 +113,7 @@ class Ensemble:
         for k, log in enumerate(self.fit.logs.fitted):
             with stage(f"free runs of log {k + 1}"):
                 try:
-                    q, found = self._runs(HeldOut(self.fit, log, ""), drawn, 1.0, rng)
+                    q, found = self._runs(HeldOut(self.fit, log, Note("")), drawn, 1.0, rng)
                 except (BenchError, IdentificationError):
                     continue
             whole = np.isfinite(found).all(axis=(1, 2, 3))  # without runs in which a robot diverges

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from idbench.experiments.identification.fit import Fit
+from idbench.experiments.note import Note, option_of
 from idbench.identify import Array, Joint, KinematicTree, MotionLog, Problem
 from idbench.identify.basis.block import FRICTION, RIGID, Kind
 from idbench.identify.data.jumps import Jump, jumps
@@ -84,7 +85,9 @@ def warnings_of_log(log: MotionLog, tree: KinematicTree) -> list[str]:
         reason = "" if j in jumping else _reason(joint, ends)
         if reason:
             by_reason.setdefault(reason, []).append(f"{joint.name} goes from {ends[0]:.4g} to {ends[1]:.4g}")
-    return found + [f"{', '.join(each)}{reason}" for reason, each in by_reason.items()]  # all joints in degrees are one line
+    return found + [
+        Note(f"{', '.join(each)}{reason}", option=option_of(reason)) for reason, each in by_reason.items()
+    ]  # all joints in degrees are one line
 
 
 def unchanging(log: MotionLog, tree: KinematicTree) -> list[str]:
@@ -131,7 +134,7 @@ def _reason(joint: Joint, ends: Array) -> str:
     unit, other, option, scale = ("rad", "degrees", "deg", np.pi / 180) if hinge else ("m", "millimetres", "mm", 1e-3)
     # In the other unit a joint moves farther than any does in its own.
     if span > 3 * room and scale * ends[0] >= low - slack and scale * ends[1] <= high + slack:
-        return f": are positions logged in {other}? Then add --units q={option}"
+        return Note(f": are positions logged in {other}? Then add --units q={option}", option=f"--units q={option}")
     if ends[0] < low - slack or ends[1] > high + slack:
         order = "are joints in the order of the robot's file, and counted from its zero in its direction?"
         return f", out of its range, {low:.4g} to {high:.4g}: {order}"

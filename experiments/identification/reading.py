@@ -14,6 +14,7 @@ from idbench.experiments.identification.logs import DELAYS, with_delay
 from idbench.experiments.identification.poses import are_poses, poses_of
 from idbench.experiments.identification.request import Request
 from idbench.experiments.identification.robot_model import RobotModel
+from idbench.experiments.note import Note
 from idbench.experiments.program import program
 from idbench.experiments.requests.shared import ColumnOptions
 from idbench.experiments.requests.words import Meaning
@@ -25,8 +26,7 @@ from idbench.identify.files.layout import LogLayout
 from idbench.identify.files.reading import LAYOUT_FILE, layout_of, read_columns
 from idbench.identify.judge.delay import DelayEstimate
 
-DELAY_FOUND = "torque delay estimated from the log"
-"""How the note on a delay begins, which those leave out who print it beside the torque."""
+DELAY_FOUND = "delay"  # Mark of the note on a delay, which those leave out who print it beside the torque
 
 LATEST = 1.0  # Delay [s] that no torque of a log has
 TURN = 2 * np.pi  # [rad]
@@ -210,7 +210,7 @@ def _delayed(read: ReadLog, every: Mapping[str, DelayEstimate], unknown: Mapping
         return replace(read, notes=(*read.notes, f"{unknown[meaning]}; {read.channel.delay:g} s is assumed"))
     found = every[meaning]
     logs = tuple(with_delay(log, found) for log in read.logs)
-    notes = (*read.notes, f"{DELAY_FOUND}: {found.words}")
+    notes = (*read.notes, Note(f"torque delay estimated from the log: {found.words}", about=DELAY_FOUND))
     return replace(read, logs=logs, channel=found.of(read.channel), notes=notes)
 
 

@@ -13,6 +13,7 @@ from idbench.experiments.identification.consistent_robot import WrittenRobot
 from idbench.experiments.identification.fit import Fit
 from idbench.experiments.identification.fitting import fit
 from idbench.experiments.judgement.warnings import wrong_sign
+from idbench.experiments.note import Note
 from idbench.experiments.results.writing import finite
 from idbench.experiments.text import error_percentage
 from idbench.identify import Array, Basis, IdentificationError, MotionLog, Problem, State, Validation, split, validate
@@ -41,7 +42,7 @@ class Verdict:
     """Names of the joints."""
     validation: Validation
     """Its torque errors."""
-    wrong: tuple[str, ...] = ()
+    wrong: tuple[Note, ...] = ()
     """Which of the fitted torques have the wrong sign, and why."""
     causes: tuple[Cause, ...] = ()
     """Mistakes that the fit shows: its parameters may be off by more than the torques."""
@@ -73,7 +74,7 @@ class Verdict:
     @cached_property
     def reasons(self) -> list[str]:
         """Why, the worst joint first."""
-        signs = [reason.partition(":")[0] for reason in self.wrong]
+        signs = [note.finding for note in self.wrong]
         return [*signs, *self._errors(), *self._left(), *(cause.words for cause in self.causes[:1])]
 
     def _errors(self) -> Iterator[str]:
@@ -130,7 +131,7 @@ def on_log(result: Fit, name: str, log: MotionLog) -> "HeldOut":
     """Return a fit on another log; of a long one on its beginning."""
     missing = {*log.missing, *never_logged(result.logs.fitted)}  # of what only their rows would show nothing is known
     one = replace(manageable([log])[0], missing=tuple(missing))
-    return HeldOut(result, one, f"held-out log {name}", result.diagnosis or ())
+    return HeldOut(result, one, Note(f"held-out log {name}"), result.diagnosis or ())
 
 
 def on_last_quarter(result: Fit) -> "HeldOut":
@@ -139,7 +140,10 @@ def on_last_quarter(result: Fit) -> "HeldOut":
     rest, end = split(logs.fitted[k])
     fitted = (*logs.fitted[:k], rest, *logs.fitted[k + 1 :])
     laws = "" if result.choice is None else ", with the laws of friction that all of it chose"
-    title = f"the last quarter of {logs.longest_name}, by a fit of the rest{laws}"
+    title = Note(
+        f"the last quarter of {logs.longest_name}, by a fit of the rest{laws}",
+        finding=f"the last quarter of {logs.longest_name}",
+    )
     return HeldOut(fit(result.request, replace(logs, fitted=fitted)), manageable([end])[0], title, result.diagnosis or ())
 
 
@@ -151,8 +155,8 @@ class HeldOut:
     """The fit."""
     log: MotionLog
     """The log."""
-    title: str
-    """What to call it."""
+    title: Note
+    """What to call it, and how it was made."""
     causes: tuple[Cause, ...] = ()
     """Mistakes that the whole fit shows."""
 

@@ -27,6 +27,7 @@ from idbench.experiments.judgement.warnings import (
     warnings_of_result,
     wrong_sign,
 )
+from idbench.experiments.note import Note, option_of
 from idbench.experiments.text import error_percentage
 from idbench.identify import IdentificationError, RangeError, WeightedLeastSquares, estimate, validate
 from idbench.identify.judge.delay import estimate_delay, nearby_delay
@@ -74,9 +75,10 @@ def delay_advice(result: Fit) -> Iterator[str]:
     delayed = result.problem.explicit.with_logs([with_delay(log, measured) for log in logs])
     before, after = (np.log(held_out_errors(problem)) for problem in (result.problem.explicit, delayed))
     if np.nansum(after) < np.nansum(before) and np.exp(np.nanmin(after - before)) < WORTH_A_WORD:
-        yield (
+        yield Note(
             f"the log shows a torque delay of {1e3 * measured.delay:.3g} ms (sigma {1e3 * measured.doubt:.1g}), where "
-            f"{1e3 * assumed:.3g} ms is assumed: --torque-delay estimate"
+            f"{1e3 * assumed:.3g} ms is assumed: --torque-delay estimate",
+            option="--torque-delay estimate",
         )
 
 
@@ -109,7 +111,7 @@ class Remedies:
             least = min(least, after)
             if after < min(WORTH * before, TOLERABLE) or after < DRASTIC * before:
                 fall = f"from {error_percentage(before)} to {error_percentage(after)}"
-                yield f"with {option} the worst joint's error falls {fall}"
+                yield Note(f"with {option} the worst joint's error falls {fall}", option=option)
 
     def _others(self) -> dict[str, Callable[[], RobotModel]]:
         """Return the options, and what makes the robot that each describes."""
@@ -170,7 +172,7 @@ def checks(judgement: Judgement, *, delay: bool, trials: bool = True) -> dict[st
         # Friction absorbs a wrong delay, and the verdict may be good: the log itself is asked.
         found[DELAY] += delay_advice(result) if delay else ()
         found[MODEL] += Remedies(hardest).options() if trials and not judgement.good else ()
-    late = [("delay", "torque", None)] if any("--torque-delay" in advice for advice in found[DELAY]) else []
+    late = [("delay", "torque", None)] if any(map(option_of, found[DELAY])) else []
     of_model = (c for c in result.diagnosis or () if (c.suspect.cause, c.suspect.of, c.suspect.joint) not in late)
     found[MODEL] += [cause.advice for cause in of_model]
     return found
@@ -184,7 +186,7 @@ def warnings_of_logs(judgement: Judgement) -> Iterator[str]:
     every += [(f"{name}: ", log) for name, log in (logs.held_out or {}).items()]
     untested = judgement.fit.diagnosis is None
     return (
-        before + warning
+        Note(before + warning, option=option_of(warning))
         for before, log in every
         for warning in (*warnings_of_log(log, tree), *(unchanging(log, tree) if untested else ()))
     )

@@ -7,6 +7,7 @@ import numpy as np
 from idbench.experiments.identification.fit import Fit
 from idbench.experiments.identification.log_warnings import resting, unlike_file, warnings_of_base
 from idbench.experiments.identification.robot_model import RobotModel
+from idbench.experiments.note import Note
 from idbench.identify import MotionLog, brisk_shares, showing_moves
 from idbench.identify.basis.block import NOT_NEGATIVE, named
 from idbench.identify.data.motion_log import never_logged
@@ -64,9 +65,10 @@ def _seems_simulated(fit: Fit) -> Iterator[str]:
     own = [j for j in range(robot.n) if inertia[j] > 0 and named("Ia", j) in found]
     more = [(found[named("Ia", j)] - robot.model.dof_armature[j]) / inertia[j] for j in own]
     if len(own) > 1 and max(np.abs(np.array(more) - 1)) < ALIKE:
-        yield (
+        yield Note(
             f"rotors are larger than the file's by {' '.join(f'{inertia[j]:.3g}' for j in own)} kg m^2, which the integrator "
-            "of a MuJoCo simulation of it makes of its damping: is this log of one? Then add --simulated"
+            "of a MuJoCo simulation of it makes of its damping: is this log of one? Then add --simulated",
+            option="--simulated",
         )
 
 
@@ -191,7 +193,7 @@ def undescribed(robot: Robot) -> list[str]:
     return [*messages, *warnings_of_base(kinematic_tree(robot))]
 
 
-def wrong_sign(fit: Fit) -> list[str]:
+def wrong_sign(fit: Fit) -> list[Note]:
     """Return which torques have the wrong sign: those that drive their joint by friction."""
     model, estimate = next(iter(fit.estimates.items()))
     values = zip(fit.basis.parameters, estimate.X, estimate.own_sigma, strict=True)
@@ -206,10 +208,9 @@ def wrong_sign(fit: Fit) -> list[str]:
         return []
     work = _work(fit.logs.fitted[0])
     balance = f", and the torques of the log take out {-work:.3g} J in all" if work < 0 else ""
-    return [
-        f"friction drives {', '.join(wrong)} in the {model} model{balance}: does the torque have the wrong sign (it must be "
-        "that on the joint, positive where it speeds up a positive motion)?"
-    ]
+    finding = f"friction drives {', '.join(wrong)} in the {model} model{balance}"
+    asked = "does the torque have the wrong sign (it must be that on the joint, positive where it speeds up a positive motion)?"
+    return [Note(f"{finding}: {asked}", finding=finding)]
 
 
 def _surely_negative(x: float, sigma: float) -> bool:

@@ -12,6 +12,7 @@ from idbench.experiments.identification.fit import Fit
 from idbench.experiments.judgement.held_out import FAIR, GOOD, Verdict
 from idbench.experiments.judgement.judgement import Judgement
 from idbench.experiments.judgement.warnings import DELAY, FLAGS, LOG, doubtful, used
+from idbench.experiments.note import option_of
 from idbench.experiments.text import WORTHLESS, error_percentage, number, percent, relative, with_unit
 from idbench.identify import Estimate
 from idbench.identify.arrays import Array
@@ -156,11 +157,11 @@ def conclusion(judgement: Judgement, warnings: Mapping[str, Sequence[str]]) -> t
 
     What is wrong with the log, and has an option that mends it, comes before mistakes of the model: it may cause them.
     """
-    of_log = next((warning for warning in warnings.get(LOG, ()) if "--" in warning), "")
+    of_log = next((warning for warning in warnings.get(LOG, ()) if option_of(warning)), "")
     first = next((found[0] for found in warnings.values() if found), "")
-    late = next((warning for warning in warnings.get(DELAY, ()) if "--torque-delay" in warning), "")
+    late = next(filter(None, map(option_of, warnings.get(DELAY, ()))), "")
     if late and (causes := judgement.fit.diagnosis) and causes[0].suspect.cause == "delay":
-        return _found(judgement, causes), "next: --torque-delay estimate"
+        return _found(judgement, causes), f"next: {late}"
     return _found(judgement, [] if of_log else judgement.fit.diagnosis or []), _next(judgement, of_log, first)
 
 
@@ -176,19 +177,14 @@ def _found(judgement: Judgement, causes: Sequence[Cause]) -> str:
         return "Result: not validated"
     model = one.fit.leading
     if verdict.wrong:
-        return f"Result: {verdict.word} ({model} model): {verdict.wrong[0].partition(':')[0]}"
+        return f"Result: {verdict.word} ({model} model): {verdict.wrong[0].finding}"
     worst = float(np.nanmax(np.nan_to_num(one.torques[model].percent, nan=0.0, posinf=np.inf)))
     beyond = float(np.nanmax(np.nan_to_num(one.torques[model].percent_of_level(one.torques[model].excess), posinf=np.inf)))
     most = {"good": GOOD, "fair": FAIR}.get(verdict.word, np.inf)
     noisy = f", {error_percentage(beyond)} beyond noise and sigma," if beyond < most < worst else ""
     off = f"torque errors of at most {error_percentage(worst)}{noisy}"
-    found = f"Result: {verdict.word} ({model} model), {off} on {_short(one.title)}"
+    found = f"Result: {verdict.word} ({model} model), {off} on {one.title.finding}"
     return "; ".join([found, *(cause.words for cause in causes[:1])])
-
-
-def _short(title: str) -> str:
-    """Return what a held-out log is called, without how it was made."""
-    return title.partition(", by a fit of the rest")[0]
 
 
 def _next(judgement: Judgement, of_log: str, first: str) -> str:

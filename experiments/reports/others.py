@@ -46,7 +46,7 @@ def report_of_servos(made: ServosFit, notes: Sequence[str], command: str) -> str
     return _page(
         f"{made.servos.robot}: {', '.join(made.fits)}",
         ", ".join(dict.fromkeys(f"driven by {fit.servo.kind}" for fit in made.fits.values())),
-        verdicts=[(_word(line), line) for line in made.verdicts],
+        verdicts=made.verdicts,
         warnings={"the servos": warnings_of(made.every, made.mistakes)},
         tables=[("Parameters", ["joint", "parameter", "value", "unit"], rows)],
         figures=[
@@ -97,11 +97,6 @@ def _page(title: str, subtitle: str, **words: Any) -> str:
     words["warnings"] = {about: said for about, said in words["warnings"].items() if said}
     own = {"title": title, "subtitle": subtitle, "version": version("idbench")}
     return rendered("idbench.experiments.reports", "plain.html.j2", **own, **words)
-
-
-def _word(line: str) -> str:
-    """Return the verdict in a line about a joint."""
-    return next((word for word in ("good", "fair", "poor") if f": {word}" in line), "unsure")
 
 
 def _unit(name: str) -> str:

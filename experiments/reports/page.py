@@ -13,7 +13,7 @@ from idbench.experiments.identification.fit import Fit
 from idbench.experiments.judgement.held_out import HeldOut
 from idbench.experiments.judgement.judgement import Judgement, Unjudged
 from idbench.experiments.judgement.warnings import FLAGS, doubtful, used
-from idbench.experiments.reports.estimates import conclusion, verdict_on
+from idbench.experiments.reports.estimates import verdict_on
 from idbench.experiments.reports.figures import (
     causes_figure,
     color_of,
@@ -35,7 +35,12 @@ LONGEST = 20  # Correlations that are listed, the strongest ones
 
 
 def report(
-    judgement: Judgement, warnings: Mapping[str, Sequence[str]], notes: Sequence[str], command: str, attempts: Attempts
+    judgement: Judgement,
+    answer: tuple[str, str],
+    warnings: Mapping[str, Sequence[str]],
+    notes: Sequence[str],
+    command: str,
+    attempts: Attempts,
 ) -> str:
     """Return the page: whether to trust it, what to check, torques, parameters, friction, residuals, logs, the command.
 
@@ -49,7 +54,7 @@ def report(
         title=f"{robot_model.tree.name}: {fit.logs.title}",
         subtitle=f"{robot_model.tree.n} joints, {len(fit.basis.names)} parameters, {fit.request.estimator}",
         warnings={about: messages for about, messages in warnings.items() if messages},
-        **_of_judgement(judgement, warnings, attempts),
+        **_of_judgement(judgement, answer, attempts),
         **_of_estimates(fit),
         causes=_figure(attempts, "causes", causes_figure, fit),
         friction=_figure(attempts, "friction", friction_figure, fit),
@@ -69,10 +74,10 @@ def report(
     )
 
 
-def _of_judgement(judgement: Judgement, warnings: Mapping[str, Sequence[str]], attempts: Attempts) -> dict[str, Any]:
+def _of_judgement(judgement: Judgement, answer: tuple[str, str], attempts: Attempts) -> dict[str, Any]:
     """Return verdict, next step, and the held-out logs."""
     hardest, on_best = judgement.hardest, verdict_on(judgement)
-    verdict, step = conclusion(judgement, warnings)
+    verdict, step = answer
     return {
         "verdict": verdict,
         "step": step,

@@ -13,7 +13,7 @@ from idbench.experiments.identification.robot_model import absolute
 from idbench.experiments.requests.jobs import ServoRequest
 from idbench.experiments.servo.identification import AUTO, Servos, lacks_summary, mistake_summary, summary_of
 from idbench.experiments.servo.joints import Identified
-from idbench.experiments.servo.servo_text import verdicts
+from idbench.experiments.servo.servo_text import verdict_lines
 from idbench.identify import Array, IdentificationError, SettingError
 from idbench.identify.files.servo_file import ServoFile
 from idbench.identify.files.servo_log import ServoColumns, ordered, read_servo_log
@@ -56,10 +56,10 @@ class ServosFit:
         return found | ({"held out": self.others.errors(self.fits)} if self.others else {})
 
     @property
-    def verdicts(self) -> list[str]:
-        """What the errors mean."""
+    def verdicts(self) -> list[tuple[str, str]]:
+        """What the errors mean: lines, each after its verdict."""
         moved = self.others.moved if self.others else {}
-        return verdicts(self.fits, self.errors["fitted"], self.errors.get("held out", {}), moved, self.mistakes)
+        return verdict_lines(self.fits, self.errors["fitted"], self.errors.get("held out", {}), moved, self.mistakes)
 
     def parameters(self) -> dict[str, Any]:
         """Return what a summary.json says of the fits."""
@@ -74,7 +74,7 @@ class ServosFit:
     def summary(self) -> dict[str, Any]:
         """Return what a summary.json says of the fits and of their errors."""
         each = {what: {joint: [float(x) for x in e] for joint, e in of.items()} for what, of in self.errors.items()}
-        return self.parameters() | {"position_error": each, "verdict": self.verdicts}
+        return self.parameters() | {"position_error": each, "verdict": [line for _, line in self.verdicts]}
 
 
 Heard = Callable[[str, Identified | str, ServosFit], None]

@@ -83,14 +83,15 @@ def print_errors(page: Page, what: str, errors: Mapping[str, Array]) -> None:
 def warnings_of(fits: Mapping[str, ServoFit | str], mistakes: Collection[str] = ()) -> list[str]:
     """Return what to check, each thing once for all joints that it concerns; `mistakes` are joints of which one was proved."""
     every = ((joint, fit) for joint, fit in fits.items() if isinstance(fit, ServoFit))
-    return _grouped((joint, text) for joint, fit in every for text in _warnings(fit, joint in mistakes))
+    return list(_grouped((joint, text) for joint, fit in every for text in _warnings(fit, joint in mistakes)).values())
 
 
-def _grouped(said: Iterable[tuple[str, str]]) -> list[str]:
+def _grouped(said: Iterable[tuple[str, str]]) -> dict[str, str]:
+    """Lines that name the joints of each sentence, by the sentence."""
     joints = dict[str, list[str]]()
     for joint, text in said:
         joints.setdefault(text, []).append(joint)
-    return [f"{', '.join(of)}: {text}" for text, of in joints.items()]
+    return {text: f"{', '.join(of)}: {text}" for text, of in joints.items()}
 
 
 def _warnings(fit: ServoFit, mistaken: bool) -> Iterator[str]:
@@ -133,14 +134,14 @@ def confounded(fit: ServoFit) -> str:
     return f"Ia and delay are hardly told apart: {per_ms:+.2g} kg m^2 for each ms"
 
 
-def verdicts(
+def verdict_lines(
     fits: Mapping[str, ServoFit],
     fitted: Mapping[str, Array],
     held_out: Mapping[str, Array],
     moved: Mapping[str, float],
     mistakes: Mapping[str, ServoMistake],
-) -> list[str]:
-    """Return lines: whether models hold on logs that they did not see, and where their residuals are largest.
+) -> list[tuple[str, str]]:
+    """Lines, each after its verdict: whether models hold on held-out logs ("unsure" of other lines), and what they lack.
 
     Parameters
     ----------
@@ -151,14 +152,17 @@ def verdicts(
     mistakes : mapping of str to ServoMistake
         What was proved to be wrong.
     """
-    said = [
-        (joint, _holds(fit, fitted[joint], held_out.get(joint), moved.get(joint, 0.0), joint in mistakes))
+    holds = {
+        joint: _holds(fit, fitted[joint], held_out.get(joint), moved.get(joint, 0.0), joint in mistakes)
         for joint, fit in fits.items()
-    ]
+    }
+    said = [(joint, f"{word}: {why}" if joint in held_out else why) for joint, (word, why) in holds.items()]
+    word_of = {why: word for (_, why), (word, _) in zip(said, holds.values(), strict=True)}
     words = [(joint, mistake_words(mistake)) for joint, mistake in mistakes.items()]
     alike = [(joint, text) for joint, fit in fits.items() if (text := confounded(fit))]
     lacks = [(joint, _lacks(fit)) for joint, fit in fits.items()]
-    return [line for lines in (said, words, alike, lacks) for line in _grouped(lines)]
+    rest = [("unsure", line) for lines in (words, alike, lacks) for line in _grouped(lines).values()]
+    return [*((word_of[why], line) for why, line in _grouped(said).items()), *rest]
 
 
 def mistake_words(mistake: ServoMistake) -> str:
@@ -172,20 +176,21 @@ def mistake_words(mistake: ServoMistake) -> str:
     )
 
 
-def _holds(fit: ServoFit, fitted: Array, held_out: Array | None, moved: float, mistaken: bool) -> str:
+def _holds(fit: ServoFit, fitted: Array, held_out: Array | None, moved: float, mistaken: bool) -> tuple[str, str]:
+    """Verdict on a joint, and why."""
     if held_out is None:
-        return "no held-out log says whether the model holds elsewhere (name a second log)"
+        return "unsure", "no held-out log says whether the model holds elsewhere (name a second log)"
     floor, ratio = fit.loop.step / 4, float(np.mean(held_out) / max(float(np.mean(fitted)), TINY))
     share = 100 * float(np.mean(held_out)) / max(moved, TINY)
     off = f"its mean error there is {error_percentage(share)} of the motion"
     best = "fair" if mistaken or not fit.explained else "good"
     if np.mean(held_out) <= 2 * floor:
-        return f"{best}: the model holds on other logs, {off}"
+        return best, f"the model holds on other logs, {off}"
     word = best if share <= GOOD else "fair" if share <= FAIR else "poor"
     if ratio > ALIKE and share > GOOD:
         word = "poor" if share > FAIR else "fair"
-        return f"{word}: worse on other logs: {off}, {ratio:.2g} times that on the fitted ones"
-    return f"{word}: the model holds on other logs, {off}"
+        return word, f"worse on other logs: {off}, {ratio:.2g} times that on the fitted ones"
+    return word, f"the model holds on other logs, {off}"
 
 
 def _lacks(fit: ServoFit) -> str:

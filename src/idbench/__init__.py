@@ -44,9 +44,7 @@ if TYPE_CHECKING:
 if not (Path(__file__).parent / "sim").is_dir():  # a checkout whose links are text files, as Git for Windows writes them
     root = Path(__file__).parents[2]
     if not (root / "sim").is_dir():
-        raise ImportError(
-            f"there is no folder sim in {Path(__file__).parent}, nor in {root}: idbench is incomplete, install it again"
-        )
+        raise ImportError(f"there is no folder sim in {Path(__file__).parent}, nor in {root}: install idbench again")
     __path__.append(str(root))
 
 PLACES = {

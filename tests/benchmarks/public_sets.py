@@ -295,7 +295,7 @@ def servo_row(folder: Path, definition: Definition, out: Path) -> Row:
         "published": [asdict(one) for one in definition.published],
         "notes": [f"{joint}: {why}" for joint, why in made.every.items() if isinstance(why, str)],
         "verdict": None,
-        "verdicts": made.verdicts,
+        "verdicts": [line for _, line in made.verdicts],
         "repeats": {},
         "free_run": [{"nrmse": [finite(x) for x in nrmse]} for nrmse in _of_servos(others, made.fits, joints)],
         "tools": {},

@@ -13,6 +13,7 @@ from scipy.interpolate import CubicSpline
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.fit import Fit
 from idbench.experiments.judgement.held_out import HeldOut
+from idbench.experiments.note import Note
 from idbench.experiments.results.writing import finite
 from idbench.identify import Array, MotionLog, Problem, TorqueChannel, validate
 from idbench.identify.arrays import combined
@@ -42,7 +43,7 @@ def write_for_tools(fit: Fit, delay_told: bool, folder: Path) -> None:
     for k, log in enumerate(told):
         _write_arrays(folder / f"fit{k + 1}.npz", prepared(log))
     for k, log in enumerate((fit.logs.held_out or {}).values()):
-        held_out = HeldOut(fit, manageable([log])[0], "")
+        held_out = HeldOut(fit, manageable([log])[0], Note(""))
         _write_arrays(folder / f"held_out{k + 1}.npz", {**prepared(held_out.log), "idbench": own_torques(held_out)})
     robot_model = fit.robot_model
     text = urdf_text(

@@ -75,8 +75,11 @@ def identify(options: Identify) -> None:
             except BaseException:  # whatever ends it, the estimates are worth keeping
                 _show_fit(page, result, options, whole_models)
                 raise
+            answer = "", ""
             if judgement is not None:
-                _show_answer(page, judgement, warnings, options)
+                answer = _answered(judgement, warnings, options)
+                page.print(Text(answer[0], f"bold {COLORS.get(_word(judgement), '')}".strip()), soft_wrap=True)
+                page.print(Text(f"{answer[1]}\n", "bold"), soft_wrap=True)
             _show_fit(page, result, options, whole_models)
             if judgement is None:
                 return
@@ -88,7 +91,7 @@ def identify(options: Identify) -> None:
             page.warn(warnings)
             attempts.attempt("summary.json", lambda: _save(folder, page))
             page.end()
-            view_all(Shown(page, options, command, judgement, warnings, folder, audience), attempts)
+            view_all(Shown(page, options, command, judgement, answer, warnings, folder, audience), attempts)
 
 
 def _checked(judgement: Judgement, options: Identify, attempts: Attempts) -> Mapping[str, Sequence[str]]:
@@ -98,16 +101,19 @@ def _checked(judgement: Judgement, options: Identify, attempts: Attempts) -> Map
         return attempts.attempt("the checks", lambda: checks(judgement, delay=delay, trials=not options.no_trials)) or {}
 
 
-def _show_answer(page: Page, judgement: Judgement, warnings: Mapping[str, Sequence[str]], options: Identify) -> None:
-    """Show the verdict, and what to do next."""
-    (said, step), verdict = conclusion(judgement, warnings), verdict_on(judgement)
-    word = verdict.word if verdict else ""
-    if word == "poor" and assumes_the_robot(options):
+def _word(judgement: Judgement) -> str:
+    verdict = verdict_on(judgement)
+    return verdict.word if verdict else ""
+
+
+def _answered(judgement: Judgement, warnings: Mapping[str, Sequence[str]], options: Identify) -> tuple[str, str]:
+    """The verdict in a sentence, and what to do next: terminal and report show the same."""
+    said, step = conclusion(judgement, warnings)
+    if _word(judgement) == "poor" and assumes_the_robot(options):
         step = f"next: {ASSUMED}: --robot FILE names another"
     elif judgement.good and options.write:
         step = "next: docs/exports.md says how the written files are used"
-    page.print(Text(said, f"bold {COLORS.get(word, '')}".strip()), soft_wrap=True)
-    page.print(Text(f"{step}\n", "bold"), soft_wrap=True)
+    return said, step
 
 
 def _judged(result: Fit, options: Identify) -> Judgement:
@@ -132,7 +138,7 @@ def _followed(stack: ExitStack, options: Identify, request: Request, audience: A
 def _show_fit(page: Page, result: Fit, options: Identify, whole: tuple[str, ...]) -> None:
     """Show the estimates."""
     print_fit(page, result, ", ".join(map(str, options.log)), whole, verbose=options.verbose)
-    notes = (note for note in notes_of(result) if not note.startswith(DELAY_FOUND))
+    notes = (note for note in notes_of(result) if getattr(note, "about", "") != DELAY_FOUND)
     for note in (*notes, *([ASSUMED] if assumes_the_robot(options) else [])):
         page.print(Text(note), soft_wrap=True)
     page.show()

@@ -31,6 +31,8 @@ class Shown:
     """The same as it is typed."""
     judgement: Judgement
     """The judged fit."""
+    answer: tuple[str, str]
+    """The verdict in a sentence, and the next step."""
     warnings: Mapping[str, Sequence[str]]
     """What to check, by what it is about."""
     folder: ResultsFolder | None
@@ -50,7 +52,7 @@ def report(shown: Shown, attempts: Attempts) -> None:
         return
     from idbench.experiments.reports.page import report as page_of
 
-    text = page_of(shown.judgement, shown.warnings, shown.page.found["notes"], shown.command, attempts)
+    text = page_of(shown.judgement, shown.answer, shown.warnings, shown.page.found["notes"], shown.command, attempts)
     shown.folder.add("report.html", text)
 
 

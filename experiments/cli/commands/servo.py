@@ -57,7 +57,7 @@ def servo(options: IdentifyServo) -> None:
         for what, each in made.errors.items():
             print_errors(page, "fitted logs" if what == "fitted" else "held out logs", each)
         page.found |= made.summary()
-        for line in made.verdicts:
+        for _, line in made.verdicts:
             page.print(Text(line), soft_wrap=True)
         page.show()
         save_summary(page, folder)
