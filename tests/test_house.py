@@ -1,4 +1,4 @@
-"""What keeps the house as it is: no circle of files, one class of a name, nothing inherits but from what is abstract, fewer lines."""
+"""What keeps the house as it is: no circle of files, one class of a name, inheritance from abstract classes, fewer lines."""
 
 import ast
 import re

@@ -67,7 +67,7 @@ def test_every_plugin_is_in_its_table(root):
 
 
 def test_the_causes_in_the_docs_are_those_computed(root, table1):
-    from idbench.experiments.paper.table1_text import causes
+    from idbench.experiments.paper.table1 import causes
 
     text = (root / "docs" / "appendix.md").read_text()
     for name, worst in causes(table1):

@@ -7,15 +7,17 @@ import numpy as np
 from idbench.experiments.identification.causes import causes_of
 from idbench.experiments.identification.fit import Fit
 from idbench.experiments.identification.friction_choice import chosen_in_turns, hidden_laws
+from idbench.experiments.identification.friction_laws import said
 from idbench.experiments.identification.logs import Logs
 from idbench.experiments.identification.prior_share import chosen_share
 from idbench.experiments.identification.request import Request
-from idbench.experiments.identification.smooth_friction import smoothed
+from idbench.experiments.identification.smooth_friction import places_of, sizes_of
 from idbench.identify import (
     ESTIMATORS,
     MODELS,
     ExcitationError,
     IdentificationError,
+    MotionLog,
     Problem,
     attempt_each,
 )
@@ -24,10 +26,18 @@ from idbench.identify.judge.diagnosis import diagnosed, silent_joint, still_join
 from idbench.identify.judge.mask_choice import suited_reach
 from idbench.identify.judge.stretches import held_out_errors
 from idbench.identify.judge.suspect import Suspect
+from idbench.identify.parameters.prior import evident_sizes
 
 SPOILT = 0.5
 """Share of the error of the other joints that is left without the zeros of one, if its torque was not logged. Of a joint that
 nobody drives zeros are right: without them others are not predicted better."""
+
+
+BESIDE = "standard+load"  # Laws beside the smooth functions
+
+FINE = 0.1
+"""Velocity below which functions are fine, over the joint's rms speed: published Stribeck velocities, 0.02 to 0.5 rad/s, are
+some tenths of the speeds of brisk motions (Armstrong-Helouvry et al., Automatica 30 (1994) 1083-1138)."""
 
 
 def fit(request: Request, logs: Logs) -> Fit:
@@ -42,7 +52,7 @@ def fit(request: Request, logs: Logs) -> Fit:
     if request.robot_model.laws.auto:
         request, logs, choice = chosen_in_turns(request, logs)
     if request.robot_model.laws.smooth:
-        request = smoothed(request, logs.fitted)
+        request = _smoothed(request, logs.fitted)
     if request.robot_model.share_sought:
         request = replace(request, share=chosen_share(request, logs.fitted))
     problem = request.problem(logs.fitted)
@@ -119,3 +129,21 @@ def _with_its_cause(found: Fit, error: IdentificationError) -> IdentificationErr
         return error
     causes = [cause.advice for cause in causes_of(suspects, found.robot_model, found.logs.fitted[0])]
     return IdentificationError(f"{error}; with GLS, {'; '.join(causes)}") if causes else error
+
+
+def _smoothed(request: Request, logs: tuple[MotionLog, ...]) -> Request:
+    """Return a request with smooth functions of each joint's velocity, of the sizes that make the logs most likely.
+
+    tau_j = W_j x + Z_j u_j + e_j,   u_j ~ N(0, s_j^2 I),   s_j by `evident_sizes`
+    """
+    robot_model = request.robot_model
+    plain = replace(request, robot_model=robot_model.plain).problem(logs)
+    speed = np.sqrt(np.mean([np.mean(part.state.qd**2, axis=-1) for part in plain.signals], axis=0))
+    joints = robot_model.robot.joints
+    words = tuple(f"{said(j, joints)}={BESIDE}+smooth:{max(FINE * v, 1e-3):.4g}" for j, v in enumerate(speed))
+    made = replace(request, robot_model=replace(robot_model, asked=replace(robot_model.asked, friction=words)))
+    begin = sizes_of(logs)
+    problem = replace(made, smooth=begin).problem(logs)
+    places, of = (np.array(each) for each in places_of(problem.basis))
+    groups = [places[of == j] for j in range(problem.basis.n)]
+    return replace(made, smooth=tuple(evident_sizes(problem.factors.fit(2).factor.R, groups, np.array(begin)).tolist()))

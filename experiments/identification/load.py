@@ -148,7 +148,7 @@ def judged_on(loaded: Loaded, every: Mapping[str, ReadLog], truth: Mapping[str, 
             raise ExperimentError(f"--validate {name} holds the motion that is identified: give another motion, or none")
     held_out, notes = {name: one.longest for name, one in every.items()}, (*loaded.notes, *of_each(said))
     gains = loaded.read[0].columns.gain
-    return Logs(loaded.logs(), loaded.names, held_out, notes, truth, sought, gains, tuple(every.values()))
+    return Logs(loaded.logs(), loaded.names, held_out, notes, truth, sought, gains)
 
 
 def require_different(paths: Sequence[Path]) -> None:

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -14,9 +14,6 @@ from idbench.identify.data.resample import Repaired
 from idbench.identify.judge.band import content_end
 from idbench.identify.judge.delay import DelayEstimate, estimate_delay, estimate_joint_delays
 from idbench.identify.rows.rows import is_long
-
-if TYPE_CHECKING:
-    from idbench.experiments.identification.reading import ReadLog
 
 STILL = 1e-3  # A joint is at rest while its velocity is below this share of its largest
 
@@ -132,8 +129,6 @@ class Logs:
     """Which delay of the torques was estimated, of `DELAYS`, and may be estimated again with more laws of friction."""
     gains: tuple[float, ...] = ()
     """Torque over what the file of the first has, joint by joint, where it was multiplied by that."""
-    read_held_out: tuple["ReadLog", ...] = ()
-    """Held-out logs as they were read."""
 
     def delayed(self, basis: Basis, chain: Chain) -> tuple["Logs", bool]:
         """Return the logs with the delay that explains their torques best with other laws, and whether it moved by a sigma.

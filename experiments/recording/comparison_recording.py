@@ -14,8 +14,7 @@ from idbench.experiments.errors import ResultsError
 from idbench.experiments.identification.fitting import fit
 from idbench.experiments.identification.logs import Logs
 from idbench.experiments.identification.request import Request
-from idbench.experiments.paper.table1 import Table1
-from idbench.experiments.paper.table1_text import table1_markdown
+from idbench.experiments.paper.table1 import Table1, table1_markdown
 from idbench.experiments.paper.table2 import PAPER, Table2
 from idbench.experiments.recording.audience import Audience
 from idbench.experiments.recording.chart import NARROW, SYMBOLS, Chart, send_keys

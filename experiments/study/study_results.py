@@ -4,7 +4,6 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from math import isfinite
 from pathlib import Path
-from shlex import quote
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,7 +12,6 @@ from rich.console import Console
 from rich.text import Text
 
 from idbench.experiments.errors import ResultsError
-from idbench.experiments.program import program
 from idbench.experiments.reports.figures import rendered
 from idbench.experiments.results.attempts import Attempts
 from idbench.experiments.results.folder import ResultsFolder
@@ -38,6 +36,7 @@ from idbench.experiments.study.ratios import conclusion, ratios, ratios_summary,
 from idbench.experiments.study.statistics import BOUNDS, Cell, cells
 from idbench.experiments.study.store import Store, arrays
 from idbench.experiments.study.study import Study
+from idbench.experiments.study.worst_runs import command, worst_runs
 from idbench.experiments.text import new_table, print_table
 from idbench.experiments.text import percent as signed
 from idbench.identify.models import THREE
@@ -45,8 +44,6 @@ from idbench.identify.models import THREE
 if TYPE_CHECKING:
     from idbench.experiments.recording.study_recording import StudyRecording
     from idbench.experiments.results.page import Page
-
-WORST = 10  # Runs that are listed as the worst
 
 
 def report(study: Study, cells: Sequence[Cell], seconds: dict[str, float], folder: Path) -> str:
@@ -113,35 +110,6 @@ def _comparisons(study: Study, cells: Sequence[Cell]) -> Iterator[tuple[str, lis
     """Yield the cells of each combination of settings, of studies that compare estimators."""
     if len(study.estimators) > 1:
         yield from grouped(cells).items()
-
-
-def worst_runs(cells: Sequence[Cell]) -> list[tuple[Cell, str, float, int]]:
-    """Return the identifications with the largest relative errors: cell, parameter, error, run.
-
-    The worst run of each combination and model comes first, so that not all are of one kind; each run is there once.
-    """
-    firsts, others = list[tuple[Cell, str, float, int]](), list[tuple[Cell, str, float, int]]()
-    for cell in cells:
-        p = np.nan_to_num(np.abs(cell.error)).argmax(axis=1)
-        own = [(cell, cell.parameters[j], float(cell.error[i, j]), int(cell.run[i])) for i, j in enumerate(p)]
-        own.sort(key=_by_size)
-        firsts += own[:1]
-        others += own[1:]
-    worst: dict[int, tuple[Cell, str, float, int]] = {}
-    for entry in [*sorted(firsts, key=_by_size), *sorted(others, key=_by_size)]:
-        worst.setdefault(entry[3], entry)
-    return list(worst.values())[:WORST]
-
-
-def _by_size(entry: tuple[Cell, str, float, int]) -> float:
-    return -abs(entry[2])
-
-
-def command(study: Study, folder: Path, cell: Cell, run: int) -> str:
-    """Return what makes a run again, identified as in a cell."""
-    number = next(i for i, found in enumerate(study.methods) if found.names == cell.names[:2] and found.fits(cell.settings))
-    chosen = f" --method {number}" if number else ""
-    return f"{program()} run --from {quote(str(folder))} --index {run}{chosen}"
 
 
 def _family(title: str, cells: Sequence[Cell], axis: Axis) -> dict[str, Any]:

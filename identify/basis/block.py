@@ -3,13 +3,10 @@
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Set
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Literal, Protocol, Self, TypeAlias, final, runtime_checkable
+from typing import Any, Literal, Protocol, Self, TypeAlias, final, runtime_checkable
 
 from idbench.identify.arrays import Array
 from idbench.identify.signals.signals import State
-
-if TYPE_CHECKING:
-    from idbench.identify.basis.basis import Basis
 
 Kind = Literal[
     "inertia",
@@ -134,8 +131,8 @@ class AbstractBlock(ABC):
         """Whether columns depend on parameters, so that the block holds about an estimate alone: see `adapted`."""
         return False
 
-    def adapted(self, basis: "Basis", X: Array) -> "AbstractBlock":
-        """Return the block about an estimate X, shape (..., p), in a basis that has it: ``basis.value(parameter, X)``."""
+    def adapted(self, basis: Any, X: Array) -> "AbstractBlock":
+        """Return the block about an estimate X, shape (..., p), in a `Basis` that has it: ``basis.value(parameter, X)``."""
         del basis, X
         return self
 

@@ -136,9 +136,9 @@ def fitted(folder: Path, definition: Definition, asked: IdentifyRequest) -> SetF
         logs = replace(logs, fitted=every, held_out={f"the last quarter of {logs.name(k)}": end})
     made = fit_of(loaded.request, logs)
     seconds = time.perf_counter() - begin
-    read = dict(zip((*definition.fit, *definition.held_out), (*loaded.read, *logs.read_held_out), strict=True))
+    read = dict(zip(definition.fit, loaded.read, strict=True))
     options = replace(read_options(asked), delay=None, fallback=replace(loaded.read[0].channel, gain=1.0))
-    for name in definition.repeats:
+    for name in (*definition.held_out, *definition.repeats):
         if name not in read:
             read[name] = read_as(loaded.read[0].path, file_of(folder / name), options, loaded.request.robot_model)
     return SetFit(definition, made, read, seconds)

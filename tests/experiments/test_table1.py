@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from idbench.experiments.paper.table1 import PAPER
-from idbench.experiments.paper.table1_text import causes
+from idbench.experiments.paper.table1 import PAPER, causes
 
 FORMS = ["explicit", "implicit", "power"]
 INERTIA = [0, 3, 4, 5]

@@ -15,7 +15,7 @@ from idbench.experiments.errors import ExperimentError
 from idbench.experiments.paper.job import Searching, searched, table1_of, table2_of
 from idbench.experiments.paper.motions import Table1Motions
 from idbench.experiments.paper.motions_report import picture, print_motions
-from idbench.experiments.paper.table1_text import print_table1
+from idbench.experiments.paper.table1 import print_table1
 from idbench.experiments.paper.table2 import print_table2
 from idbench.experiments.results.folder import ResultsFolder
 from idbench.experiments.results.page import new_page, progress_of, shown
