@@ -1,13 +1,17 @@
 """The other jobs: studies, payloads, gains, servos, motions, the paper's tables."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from io import StringIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+import numpy as np
+import numpy.typing as npt
+from rich.console import Console
+
 from idbench.experiments.api.calls import PARTS, named, several
-from idbench.experiments.api.study_table import StudyTable
 from idbench.experiments.errors import ExperimentError, StudyError
 from idbench.experiments.excite.excited import Excited
 from idbench.experiments.excite.job import excited
@@ -20,10 +24,52 @@ from idbench.experiments.requests.table import request_from
 from idbench.experiments.servo.job import ServosFit, servos_identified
 from idbench.experiments.study.job import LARGEST_SHARD, runs_of_shard, worker_pool
 from idbench.experiments.study.run_study import run_missing
-from idbench.experiments.study.store import Store
+from idbench.experiments.study.statistics import Cell, cells
+from idbench.experiments.study.store import Store, arrays
 from idbench.experiments.study.study import Study
 from idbench.experiments.study.study_file import load_study
+from idbench.experiments.study.study_results import print_study, summary_of
+from idbench.experiments.text import printed
 from idbench.identify import BLOCKS
+
+WIDTH = 160  # Characters of a line
+
+
+@dataclass(frozen=True, eq=False)
+class StudyTable:
+    """The runs of a study, and what they say of every combination."""
+
+    study: Study
+    """The study."""
+    rows: Mapping[str, npt.NDArray[Any]]
+    """Every run and identification: columns by name, shape (rows,)."""
+    cells: Sequence[Cell]
+    """Errors and coverage of every combination and model."""
+    seconds: Mapping[str, float]
+    """Time of simulating and identifying [s]."""
+
+    @classmethod
+    def of(cls, store: Store) -> "StudyTable":
+        """Return the table of the runs in a folder."""
+        rows = arrays(store.table())
+        return cls(store.study, rows, cells(rows, store.study.varied, store.study.parameters), store.seconds())
+
+    def summary(self) -> dict[str, Any]:
+        """Return what `idbench study` writes into summary.json."""
+        return summary_of(self.study, self.cells, dict(self.seconds))
+
+    def typical_errors(self) -> dict[tuple[Any, ...], float]:
+        """Return the typical relative error of each combination, by its settings, chain, estimator and model."""
+        return {(*cell.settings.values(), *cell.names): float(cell.typical) if cell.runs else np.nan for cell in self.cells}
+
+    def __repr__(self) -> str:
+        return printed(lambda console: print_study(console, self.study, self.cells))
+
+    def _repr_html_(self) -> str:
+        console = Console(file=StringIO(), width=WIDTH, record=True)
+        print_study(console, self.study, self.cells)
+        return console.export_html(inline_styles=True, code_format="<pre>{code}</pre>")
+
 
 Files = str | Path | Sequence[str | Path]
 """Logs, by the names of their files."""

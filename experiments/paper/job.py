@@ -1,16 +1,155 @@
 """The jobs `table1` and `table2`: a request becomes the paper's comparison, or its experiment."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from math import ceil, inf
+
+import numpy as np
 
 from idbench.experiments.errors import ExperimentError
-from idbench.experiments.paper.search import TrajectorySearch
-from idbench.experiments.paper.table1 import CHAINS_COMPARED, SCENARIO, Table1
+from idbench.experiments.paper.table1 import CHAINS_COMPARED, PAPER, SCENARIO, Table1
 from idbench.experiments.paper.table2 import Table2
 from idbench.experiments.requests.jobs import Table1Request, Table2Request
+from idbench.identify import CHAINS, MODELS, ExplicitModel, MotionLog, Problem, TorqueChannel, scara
+from idbench.identify.rows.row_map import Kernel
+from idbench.sim.engine.run import ideal_log
 from idbench.sim.engine.watch import Watch
+from idbench.sim.robot.motors import Array
 from idbench.sim.robot.robot import Robot
 from idbench.sim.scenario.scenario import Scenario
 from idbench.sim.scenario.scenario_file import load
+from idbench.sim.trajectories import Quintic
+from idbench.sim.trajectories.quintic import draw_waypoint
+
+PAPER_CONDITION = {MODELS.create(name): PAPER[name].condition_number for name in ("explicit", "power")}
+"""Cond(W) of the paper's Table 1; that of the implicit model is the explicit one's."""
+
+
+@dataclass(frozen=True)
+class TrajectorySearch:
+    """A random search for a motion with the paper's condition numbers, the same for the same seed.
+
+    It draws a sequence of waypoints, then redraws one of them at a time and keeps what comes closer: first to the
+    limits of speed and torque, then, within them, to the condition numbers.
+    """
+
+    seed: int = 0
+    """Of everything random."""
+    fs: float = 100.0
+    """Sampling frequency [Hz]."""
+    rest: float = 3.0
+    """Time at rest at both ends [s]."""
+    motion: float = 40.0
+    """Time from the first to the last move [s]."""
+    moves: int = 22
+    """Number of moves, each within 15 % of motion / moves long, in whole samples."""
+    chain: str = "paper_masked"
+    """Name of the chain in which the condition numbers are the paper's: its own steps, reversals left out."""
+    smallest_move: float = 0.4
+    """Least change of every joint in every move [rad]: slower moves would be masked for whole rows."""
+    clearance: float = 0.2
+    """Least distance to the ends of the joints' ranges [rad]."""
+    velocity: float = 7.0
+    """Limit of the joints' speed [rad/s]."""
+    tolerance: float = 0.01
+    """It ends when both condition numbers are within this share of the paper's."""
+    rounds: int = 300
+    """Rounds after which it gives up."""
+    candidates: int = 16
+    """Candidates of a round."""
+
+    def __post_init__(self) -> None:
+        if self.seed < 0:
+            raise ExperimentError(f"seed = {self.seed} must be 0 or a positive whole number")
+        for name in ("fs", "rest", "motion", "moves", "smallest_move", "velocity", "rounds", "candidates"):
+            if not getattr(self, name) > 0:
+                raise ExperimentError(f"{name} = {getattr(self, name)} must be above 0")
+
+    def run(self, robot: Robot, progress: Callable[[int, float], None] | None = None) -> Scenario:
+        """Return the scenario found; `progress` receives the number of every round and the distance that is left.
+
+        Raises
+        ------
+        ExperimentError
+            If the rounds end before the tolerance is reached.
+        """
+        rng = np.random.default_rng(self.seed)
+        durations = self._durations(rng)
+        best, distance = self._scenario(robot, self._drawn(rng, robot), durations), inf
+        excess = self.excess(robot, best)
+        for number in range(self.rounds):
+            points = [self._redrawn(rng, robot, np.array(best.quintic().waypoints)) for _ in range(self.candidates)]
+            others = [self._scenario(robot, p, durations) for p in points]
+            if excess > 0:
+                best, excess = min([(best, excess), *((o, self.excess(robot, o)) for o in others)], key=lambda pair: pair[1])
+            else:
+                best, distance = self._closest(robot, best, distance, others)
+            if progress:
+                progress(number + 1, distance)
+            if distance <= self.tolerance:
+                tried = (number + 1) * self.candidates
+                return replace(best, origin=f"idbench search --seed {self.seed}: {tried} candidates, chosen by Cond(W) alone")
+        raise ExperimentError(
+            f"no motion within {self.tolerance:.2%} of the paper's condition numbers in {self.rounds} rounds "
+            f"(closest: {distance:.2%}); try another seed"
+        )
+
+    def distances(self, scenarios: Sequence[Scenario]) -> Array:
+        """Return the largest departure from the paper's condition numbers, as a share; infinite if a row would be void."""
+        q = np.stack([scenario.quintic().points.sample(self.fs).q for scenario in scenarios])
+        log = MotionLog(self.fs, q, np.zeros_like(q), TorqueChannel("instantaneous"))  # W holds no torque
+        problem = Problem((log,), scara(), ExplicitModel(), replace(CHAINS.create(self.chain), trim=self.rest))
+        worst = np.zeros(len(scenarios))
+        for model, target in PAPER_CONDITION.items():
+            rows = problem.with_model(model).rows
+            share = np.abs(np.log(rows.factors.together.condition_number / target))
+            (to_rows,) = rows.maps  # every row must have an instant that is not masked, however little that is
+            reach = ceil(problem.own_chain.operator.halo(log.fs) * log.fs - 1e-9)
+            seen = Kernel(np.ones(2 * reach + 1), reach, to_rows.grid).apply(to_rows.inside)
+            worst = np.maximum(worst, np.where((seen > 0).all(axis=(-2, -1)), share, inf))
+        return worst
+
+    def _closest(self, robot: Robot, best: Scenario, distance: float, others: Sequence[Scenario]) -> tuple[Scenario, float]:
+        """Return the closest of `best` and those of `others` that keep the robot's limits."""
+        distances = self.distances(others)
+        for i in np.argsort(distances, kind="stable"):
+            if distances[i] >= distance:
+                break
+            if self.excess(robot, others[i]) <= 0:
+                return others[i], float(distances[i])
+        return best, distance
+
+    def excess(self, robot: Robot, scenario: Scenario) -> float:
+        """Return by how much a motion exceeds the limits of speed and torque, as a share; 0 or less if it keeps them."""
+        torque = np.abs(ideal_log(robot, scenario.quintic().points.sample(self.fs)).tau).max(axis=0)
+        used = np.concatenate([scenario.quintic().points.peak_velocity / self.velocity, torque / robot.torque_limits])
+        return float(used.max() - 1)
+
+    def _durations(self, rng: np.random.Generator) -> Array:
+        """Return the times of the moves: whole samples, as the paper's plan of 100 Hz has them; together the motion's."""
+        shares = rng.uniform(0.85, 1.15, self.moves)
+        ends = np.rint(np.cumsum(shares) / shares.sum() * self.motion * self.fs)
+        return np.diff(ends, prepend=0.0) / self.fs
+
+    def _drawn(self, rng: np.random.Generator, robot: Robot) -> Array:
+        points = np.zeros((self.moves + 1, robot.n))
+        for k in range(self.moves + 1):
+            points[k] = self._waypoint(rng, robot, points[max(k - 1, 0) : k])
+        return points
+
+    def _redrawn(self, rng: np.random.Generator, robot: Robot, points: Array) -> Array:
+        k = int(rng.integers(len(points)))
+        points[k] = self._waypoint(rng, robot, np.delete(points, k, axis=0)[max(k - 1, 0) : k + 1])
+        return points
+
+    def _waypoint(self, rng: np.random.Generator, robot: Robot, neighbours: Array) -> Array:
+        return draw_waypoint(rng, robot.ranges, neighbours, self.clearance, self.smallest_move)
+
+    def _scenario(self, robot: Robot, points: Array, durations: Array) -> Scenario:
+        waypoints = tuple(tuple(float(x) for x in point) for point in points)
+        trajectory = Quintic(waypoints, tuple(float(T) for T in durations), self.rest)
+        return Scenario(f"search-{self.seed}", trajectory, robot.name, self.fs, self.seed)
+
 
 Searching = Callable[[int, float], None]
 """Hears the round of a search, and how far it is from the paper's condition numbers."""

@@ -11,21 +11,23 @@ import numpy as np
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.identification.simulators import RobotPlant, ScenarioLoop
 from idbench.experiments.study.axis import Method
-from idbench.experiments.study.bound import bounds_of
 from idbench.experiments.study.servo_rows import SERVO, rows_of
 from idbench.experiments.study.statistics import BOUNDS
 from idbench.experiments.study.study import Study
 from idbench.identify import (
     Array,
+    Basis,
     Chain,
     Estimate,
     ExplicitModel,
     IdentificationError,
     MotionLog,
+    NoiseLevels,
     Problem,
     Simulation,
     Status,
     attempt_each,
+    cramer_rao,
 )
 from idbench.identify.estimators.settle import settled
 from idbench.identify.signals.prefilters import AbstractPrefilter, NoisePrefilter
@@ -34,6 +36,24 @@ from idbench.sim.engine.simulation import Progress, simulate
 from idbench.sim.errors import BenchError
 from idbench.sim.scenario.scenario import Scenario
 from idbench.sim.trajectories import Reference
+
+MIN_NOISE = 1e-9  # Noise [rad, N m] that counts as none: the bound is then that of rounding
+
+
+def bounds_of(basis: Basis, simulated: Run, truth: Mapping[str, float]) -> dict[str, Array]:
+    """Return the least standard deviations of every parameter that the noise of encoders and torques allows, shape (run, p).
+
+    What else is wrong in a scenario, such as cogging, is no part of them.
+    """
+    scenario, n = simulated.scenario, basis.n
+    noise = NoiseLevels(*(np.maximum(x, MIN_NOISE) for x in (scenario.torque.spread(n), scenario.encoder.spread(n))))
+    X = np.array(list(truth.values()))
+    found = {
+        name: cramer_rao(basis, X, simulated.q, simulated.qd, scenario.fs, noise, reversals=reversals)
+        for name, reversals in zip(BOUNDS, (False, True), strict=True)
+    }
+    return {name: np.sqrt(np.diagonal(C, axis1=-2, axis2=-1)) for name, C in found.items()}
+
 
 START = 5  # Stream of random numbers of where estimators begin
 FARTHEST = 3.0  # Standard deviations at most by which a start is off

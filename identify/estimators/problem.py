@@ -12,7 +12,6 @@ from idbench.identify.arrays import Array
 from idbench.identify.basis.basis import Basis
 from idbench.identify.data.motion_log import MotionLog
 from idbench.identify.errors import IdentificationError, LogError
-from idbench.identify.estimators.given_logs import require_logs, same_form
 from idbench.identify.estimators.log_rows import LogRows, Piece, bias_counts, pieces
 from idbench.identify.estimators.simulator import Simulation
 from idbench.identify.models import AbstractModel, ExplicitModel
@@ -24,6 +23,23 @@ from idbench.identify.rows.chain import Chain
 from idbench.identify.rows.factors import AbstractPrior, Factors, LeastSquaresFit, triangular
 from idbench.identify.rows.rows import Rows, is_long
 from idbench.identify.signals.signals import Signals
+
+ROUNDING = 1e-9  # Share by which frequencies may differ that are the same: of a file they are the mean of its steps
+
+
+def same_form(one: MotionLog, other: MotionLog) -> bool:
+    """Return whether two logs have the same samples, joints and, but for rounding, frequency."""
+    return one.q.shape[-2:] == other.q.shape[-2:] and abs(one.fs / other.fs - 1) < ROUNDING
+
+
+def require_logs(logs: Sequence[object]) -> None:
+    """Raise LogError unless all are logs, of which there is one at least."""
+    if not logs:
+        raise LogError("there is no log to identify")
+    for log in logs:
+        if not isinstance(log, MotionLog):
+            raise LogError(f"{log!r:.60} is given where a MotionLog is needed, such as read_log(path)")
+
 
 Weights = Literal["measured", "own"]
 Reduced = TypeVar("Reduced")

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from idbench.experiments.api.calls import load_robot as load_robot
     from idbench.experiments.api.calls import read_log as read_log
     from idbench.experiments.api.calls import simulate as simulate
+    from idbench.experiments.api.jobs import StudyTable as StudyTable
     from idbench.experiments.api.jobs import design as design
     from idbench.experiments.api.jobs import fit_gains as fit_gains
     from idbench.experiments.api.jobs import fit_payload as fit_payload
@@ -30,7 +31,6 @@ if TYPE_CHECKING:
     from idbench.experiments.api.results import ParameterEstimate as ParameterEstimate
     from idbench.experiments.api.results import Score as Score
     from idbench.experiments.api.results import SimulatedRun as SimulatedRun
-    from idbench.experiments.api.study_table import StudyTable as StudyTable
     from idbench.experiments.errors import ExperimentError as ExperimentError
     from idbench.experiments.identification.robot_model import RobotModel as RobotModel
     from idbench.identify import IdentificationError as IdentificationError
@@ -49,9 +49,8 @@ if not (Path(__file__).parent / "sim").is_dir():  # a checkout whose links are t
 
 PLACES = {
     "experiments.api.calls": ("load_robot", "read_log", "fit", "simulate"),
-    "experiments.api.jobs": ("study", "fit_payload", "fit_gains", "fit_servos", "design", "table1", "table2"),
+    "experiments.api.jobs": ("study", "fit_payload", "fit_gains", "fit_servos", "design", "table1", "table2", "StudyTable"),
     "experiments.api.results": ("Identification", "ParameterEstimate", "Score", "SimulatedRun"),
-    "experiments.api.study_table": ("StudyTable",),
     "experiments.errors": ("ExperimentError",),
     "experiments.identification.robot_model": ("RobotModel",),
     "identify": ("MotionLog", "TorqueChannel", "write_log", "IdentificationError"),

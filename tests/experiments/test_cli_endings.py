@@ -44,7 +44,7 @@ def test_interruption_of_the_work_leaves_nothing(out, capfd, monkeypatch):
 
 def test_a_real_interrupt_ends_the_process_without_a_traceback(tmp_path, start):
     """Ctrl-C at some instant of a long search."""
-    code = "import sys; from idbench.experiments.paper.search import TrajectorySearch; from idbench.experiments import cli\n"
+    code = "import sys; from idbench.experiments.paper.job import TrajectorySearch; from idbench.experiments import cli\n"
     code += "from idbench.experiments.paper import job as paper\n"
     code += (
         "paper.TrajectorySearch = lambda seed: print('searching') or TrajectorySearch(seed=seed, tolerance=0.0, rounds=10**6)\n"

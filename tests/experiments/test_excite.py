@@ -10,8 +10,7 @@ import pytest
 from idbench.experiments.cli import main
 from idbench.experiments.excite.design import Design
 from idbench.experiments.excite.excitation import EXCITATIONS
-from idbench.experiments.excite.excited import Excited
-from idbench.experiments.excite.stages import STAGES
+from idbench.experiments.excite.excited import STAGES, Excited
 from idbench.experiments.results.writing import NAME as MANIFEST
 from idbench.sim.limits.motion_limits import MotionLimits
 from idbench.sim.robot.inverse_dynamics import coulomb_torque, inverse_dynamics
@@ -29,7 +28,7 @@ SHORT = ["--duration", "4", "--no-rerun"]
 def hasty(monkeypatch):
     """Search a quarter as long: limits hold, and files are written, however far a search has come."""
     few = tuple(stage._replace(keep=1, steps=stage.steps // 4) for stage in STAGES)
-    monkeypatch.setattr("idbench.experiments.excite.stages.STAGES", few)
+    monkeypatch.setattr("idbench.experiments.excite.excited.STAGES", few)
 
 
 @pytest.fixture(scope="module")
@@ -236,7 +235,7 @@ def test_ctrl_c_keeps_the_best_so_far(tmp_path, monkeypatch, capsys):
             raise KeyboardInterrupt
         return value(self, c)
 
-    monkeypatch.setattr("idbench.experiments.excite.stages.STAGES", STAGES)
+    monkeypatch.setattr("idbench.experiments.excite.excited.STAGES", STAGES)
     monkeypatch.setattr(Plan, "value", interrupted)
     assert main(["excite", "scara", *SHORT, "--out", str(tmp_path / "out")]) == 0
     assert "interrupted: this is the best motion so far" in capsys.readouterr().out

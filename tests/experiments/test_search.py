@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from idbench.experiments.errors import ExperimentError
-from idbench.experiments.paper.search import TrajectorySearch
+from idbench.experiments.paper.job import TrajectorySearch
 from idbench.experiments.paper.table1 import SCENARIO, Table1
 from idbench.sim.errors import ScenarioError
 from idbench.sim.scenario.scenario_file import load

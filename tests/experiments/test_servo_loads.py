@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from idbench.experiments.servo.joint_loads import Moving, loads
+from idbench.experiments.servo.joints import Moving, loads
 from idbench.identify.files.servo_log import ServoColumns
 from idbench.sim.robot.inverse_dynamics import inverse_dynamics
 from idbench.sim.robot.mounting import PLAIN

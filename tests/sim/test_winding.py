@@ -6,8 +6,8 @@ from scipy.integrate import solve_ivp
 
 from idbench.sim.drives import SwitchedDrive
 from idbench.sim.drives.loops import Loops, Windings
-from idbench.sim.drives.passages import ExactPassages, TabulatedPassages
 from idbench.sim.drives.pwm import Modulator, pieces
+from idbench.sim.drives.switched_drive import ExactPassages, TabulatedPassages
 from idbench.sim.drives.winding import Winding, pass_period
 from idbench.sim.robot.robot import Robot
 
