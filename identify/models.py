@@ -152,7 +152,6 @@ class ExplicitModel(AbstractModel):
 
     def e(self, basis: Basis, state: State) -> Columns:
         """Return no columns."""
-        del basis, state
         return {}
 
 

@@ -240,7 +240,6 @@ class _PositionLaw(AbstractLaw):
         self._planned = planned if planned.ndim == 3 else [every(q, task.nsim) for q in planned]
 
     def command(self, k: int, q: Array) -> Array:
-        del q
         return self._planned[k]
 
 

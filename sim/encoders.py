@@ -54,7 +54,6 @@ class ExactEncoder(AbstractEncoder):
 
     def start(self, n: int, samples: int, fs: float, rngs: Sequence[np.random.Generator]) -> AbstractReader:
         """Return the encoder."""
-        del n, samples, fs, rngs
         return _ExactReader()
 
     def spread(self, n: int) -> Array:
@@ -64,7 +63,6 @@ class ExactEncoder(AbstractEncoder):
 
 class _ExactReader(AbstractReader):
     def read(self, k: int, q: Array) -> Array:
-        del k
         return q.copy()
 
 

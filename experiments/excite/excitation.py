@@ -56,7 +56,6 @@ class FourierExcitation(AbstractExcitation):
 
     def random(self, rng: np.random.Generator, plan: Plan, duration: float, frequency: float) -> Array:
         """Return harmonics of like velocities, about any position."""
-        del frequency
         c = rng.standard_normal((plan.states.count, len(plan.limits.velocity)))
         c[0] = rng.uniform(-0.5, 0.5, c.shape[1]) * np.diff(plan.limits.position, axis=1)[:, 0] / 2 * 2 * np.pi / duration
         c[1:] *= plan.limits.velocity * rng.uniform(0.2, 1.0)

@@ -179,7 +179,6 @@ class _Loaded(AbstractFriction):
     unit = "1"
 
     def force(self, q: Array, qd: Array) -> Array:
-        del q
         return self.load * np.sign(qd)
 
 

@@ -60,7 +60,6 @@ class Attempts:
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
         """Close at the end of the block; if it was interrupted, say what is there all the same."""
-        del error, trace
         if kind is None:
             self.close()
         elif issubclass(kind, KeyboardInterrupt | SystemExit):

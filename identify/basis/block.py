@@ -108,22 +108,18 @@ class AbstractBlock(ABC):
 
     def momentum(self, state: State) -> BlockColumns:
         """Return the columns M_i(q) qd of the momenta, still to be differentiated (Eq. 9); none by default."""
-        del state
         return {}
 
     def remainder(self, state: State) -> BlockColumns:
         """Return the columns R_i(q, qd) of the torques that are no derivative of a momentum (Eq. 8, 9); none by default."""
-        del state
         return {}
 
     def energy(self, state: State) -> BlockColumns:
         """Return the columns h_i(q, qd) of the energy in row 0, still to be differentiated (Eq. 10); none by default."""
-        del state
         return {}
 
     def dissipation(self, state: State) -> BlockColumns:
         """Return the columns of the dissipated power qd' Gamma_f in row 0 (Eq. 10); none by default."""
-        del state
         return {}
 
     @property
@@ -133,12 +129,10 @@ class AbstractBlock(ABC):
 
     def adapted(self, basis: Any, X: Array) -> "AbstractBlock":
         """Return the block about an estimate X, shape (..., p), in a `Basis` that has it: ``basis.value(parameter, X)``."""
-        del basis, X
         return self
 
     def operating_point(self, n: int) -> Mapping[Parameter, Array | float]:
         """Return the operating point of nonlinear parameters, shape (...): their columns are derivatives there."""
-        del n
         return {}
 
 

@@ -87,7 +87,6 @@ class Coupled(AbstractBlock):
 
     def parameters(self, n: int) -> tuple[Parameter, ...]:
         """Return those of the block, of the drive instead of a joint."""
-        del n
         return tuple(map(self._own, self.block.parameters(1)))
 
     def explicit(self, state: State) -> BlockColumns:

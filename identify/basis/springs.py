@@ -81,7 +81,6 @@ class Balancer(AbstractConservativeBlock):
 
     def parameters(self, n: int) -> tuple[Parameter, ...]:
         """Return F0 and Kb, and Fg of one with gas."""
-        del n
         return tuple(map(self._parameter, ("F0", "Kb", *(("Fg",) if self.volume is not None else ()))))
 
     def explicit(self, state: State) -> BlockColumns:

@@ -63,7 +63,6 @@ class SymbolArray(NDArrayOperatorsMixin):
         return _elementwise(OPERATIONS[function], *of)
 
     def __array_function__(self, function: Any, types: Any, of: Any, more: Any) -> Any:
-        del types
         if function not in _FUNCTIONS:
             raise _unknown(function)
         return _FUNCTIONS[function](*of, **more)

@@ -120,7 +120,6 @@ class _Speed(AbstractFriction):
     unit = "rad/s"
 
     def force(self, q: Array, qd: Array) -> Array:
-        del q
         return qd
 
 

@@ -47,7 +47,6 @@ class NormalPrior:
 
     def rows(self, R: Array) -> Array:
         """Return them."""
-        del R
         return self.known
 
 

@@ -19,12 +19,10 @@ class AbstractMask(ABC):
 
     def halo(self, fs: float) -> float:
         """How far a weight looks to either side [s]; 0 by default."""
-        del fs
         return 0.0
 
     def suited(self, qd: Array) -> "AbstractMask":
         """Return the mask with settings that follow a motion, velocities of shape (..., joint, time); itself by default."""
-        del qd
         return self
 
     @abstractmethod
@@ -38,7 +36,6 @@ class NoMask(AbstractMask):
 
     def weight(self, qd: Array, fs: float) -> Array:
         """Return ones."""
-        del fs
         return np.ones_like(qd)
 
 

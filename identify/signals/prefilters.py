@@ -21,12 +21,10 @@ class AbstractPrefilter(ABC):
 
     def suited(self, qd: Callable[[], Array]) -> "AbstractPrefilter":
         """Filter for a log whose unfiltered velocities, shape (..., joint, time) [rad/s], `qd` returns; itself by default."""
-        del qd
         return self
 
     def halo(self, fs: float) -> float:
         """How far the output looks to either side [s]; 0 by default."""
-        del fs
         return 0.0
 
     @abstractmethod
@@ -48,7 +46,6 @@ class NoPrefilter(AbstractPrefilter):
 
     def apply(self, x: Array, fs: float) -> Array:
         """Return `x`."""
-        del fs
         return x
 
 

@@ -119,7 +119,6 @@ class AsLogged(AbstractAlignment):
 
     def align(self, tau: Array, channel: TorqueChannel, fs: float) -> Torque:
         """Return the torque as if it were instantaneous and not delayed."""
-        del channel
         return Torque(tau, "instantaneous", 0.0, fs)
 
 

@@ -62,7 +62,6 @@ class AbstractAmplifier(ABC):
 
     def sees(self, q: Array) -> None:
         """Receive the positions in the middle of the steps to come, shape (steps or 1, nsim, joint), before `step`."""
-        del q
 
     @abstractmethod
     def step(self, demand: Array, speed: Array, steps: int) -> Array:
@@ -98,7 +97,6 @@ class AbstractAmplifier(ABC):
 
     def between_edges(self, trace: Trace) -> BetweenEdges | None:
         """Return what windings of the first simulation did within the steps of a trace; None for a drive that has no edges."""
-        del trace
         return None
 
 
@@ -125,7 +123,6 @@ class AbstractDrive(ABC):
 
     def edit(self, spec: mujoco.MjSpec) -> None:
         """Write what belongs to the drive into the joints of a robot."""
-        del spec
 
     def play(self, robot: Robot) -> Array:
         """Return the backlash of every joint [rad], shape (joint,)."""
@@ -146,7 +143,6 @@ class AbstractDrive(ABC):
         command : Array, shape (nsim, time, joint)
             What was commanded.
         """
-        del t, command
         return {}
 
     @abstractmethod

@@ -18,7 +18,6 @@ class IdealDrive(AbstractDrive):
 
     def start(self, robot: Robot, nsim: int, h: float) -> AbstractAmplifier:
         """Return the drive."""
-        del robot, nsim, h
         return _Amplifier()
 
     def lag(self, robot: Robot) -> Array:
@@ -33,9 +32,7 @@ class IdealDrive(AbstractDrive):
 
 class _Amplifier(AbstractAmplifier):
     def step(self, demand: Array, speed: Array, steps: int) -> Array:
-        del speed, steps
         return demand[None]
 
     def electric(self, trace: Trace, dt: Array) -> Electric:
-        del trace
         return Electric(*np.zeros((6, *dt.shape)))

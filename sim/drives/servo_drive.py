@@ -168,6 +168,5 @@ class _Amplifier(AbstractAmplifier):
         return duty, current, emf, limited.astype(np.float64), self._R * current + emf
 
     def electric(self, trace: Trace, dt: Array) -> Electric:
-        del dt
         duty, current, emf, limited, voltage = trace
         return Electric(current, current, voltage, duty, limited, emf)

@@ -221,7 +221,6 @@ class SwitchedAmplifier(AbstractAmplifier):
 
     def step(self, demand: Array, speed: Array, steps: int) -> Array:
         """Advance by PWM periods; return the mean torque in each."""
-        del steps
         wanted = np.minimum(np.maximum(demand / self._K, -self._I), self._I)
         e = self._K * speed
         charge, before, after, index = self._passages.advance(self._loops, self._windings, wanted, e)

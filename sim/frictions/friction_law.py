@@ -17,7 +17,6 @@ class AbstractContact(ABC):
 
     def driven(self, tau: Array) -> None:
         """Receive the torque of the drives in the step to come [N m], shape (nsim, joint), before `torque` is asked for."""
-        del tau
 
     @abstractmethod
     def torque(self, qd: Array) -> Array | float:
@@ -57,12 +56,10 @@ class AbstractFrictionLaw(ABC):
 
     def truth(self, robot: Robot) -> dict[str, float]:
         """Return what identification may find of it beside Fv and Fs, by the names of `identify`, such as vs1."""
-        del robot
         return {}
 
     def conditions(self, t: Array, n: int) -> dict[str, Array]:
         """Return what the log says beside motion and torque at its instants t [s], shape (time, joint or 1)."""
-        del t, n
         return {}
 
     @abstractmethod

@@ -32,13 +32,11 @@ class CoulombViscous(AbstractFrictionLaw):
 
     def start(self, plant: Batch, Fs: Array, h: float) -> AbstractContact:
         """Return nothing more than MuJoCo's."""
-        del plant, Fs, h
         return _CoulombContact()
 
 
 class _CoulombContact(AbstractContact):
     def torque(self, qd: Array) -> Array | float:
-        del qd
         return 0.0
 
 
@@ -58,7 +56,6 @@ class Stribeck(AbstractFrictionLaw):
 
     def start(self, plant: Batch, Fs: Array, h: float) -> AbstractContact:
         """Return the law, which sets MuJoCo's Coulomb friction anew in every step: its constraint keeps standing joints."""
-        del h
         law = StribeckFriction(self.velocity)
         return _LawContact(law, plant, Fs, (self.static - 1) * Fs)
 
@@ -87,7 +84,6 @@ class Law(AbstractFrictionLaw):
 
     def start(self, plant: Batch, Fs: Array, h: float) -> AbstractContact:
         """Return the law: where it jumps at rest MuJoCo's Coulomb friction, set anew in every step, keeps standing joints."""
-        del h
         return _LawContact(self._force, plant, Fs, per_joint(self.size, Fs.shape[-1], "friction.size"))
 
     @property
@@ -145,7 +141,6 @@ class Asymmetric(AbstractFrictionLaw):
 
     def start(self, plant: Batch, Fs: Array, h: float) -> AbstractContact:
         """Return what the directions differ by; MuJoCo makes the rest."""
-        del plant, h
         n = Fs.shape[-1]
         return _AsymmetricContact(self._each("offset", n), self._each("difference", n), self.edge)
 
@@ -181,7 +176,6 @@ class LoadDependent(AbstractFrictionLaw):
 
     def start(self, plant: Batch, Fs: Array, h: float) -> AbstractContact:
         """Return the law, which sets MuJoCo's Coulomb friction anew in every step: its constraint keeps standing joints."""
-        del h
         return _LoadContact(plant, Fs, per_joint(self.share, Fs.shape[-1], "friction.share"))
 
 
@@ -198,7 +192,6 @@ class _LoadContact(AbstractContact):
         self._tau = tau
 
     def torque(self, qd: Array) -> Array | float:
-        del qd
         self._frictionloss[:] = self._Fs + self._share * np.abs(np.sum([self._tau, *self._frictions], axis=0))
         return 0.0
 
@@ -232,7 +225,6 @@ class Warming(AbstractFrictionLaw):
 
     def start(self, plant: Batch, Fs: Array, h: float) -> AbstractContact:
         """Return what the temperature adds."""
-        del plant
         return _TemperatureContact(self, per_joint(self.slope, Fs.shape[-1], "friction.slope"), h)
 
 

@@ -86,7 +86,6 @@ class Fourier(AbstractTrajectory):
 
     def plan(self, robot: Robot) -> FourierMotion:
         """Return the series."""
-        del robot
         return FourierMotion(self)
 
 

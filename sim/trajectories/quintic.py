@@ -39,7 +39,6 @@ class Quintic(AbstractTrajectory):
 
     def plan(self, robot: Robot) -> PointToPoint:
         """Return the moves."""
-        del robot
         return self.points
 
 

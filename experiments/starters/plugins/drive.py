@@ -34,7 +34,6 @@ class _Amplifier(AbstractAmplifier):
         self._tau, self._share = tau, share
 
     def step(self, demand: Array, speed: Array, steps: int) -> Array:
-        del speed
         torques = np.empty((steps, *demand.shape))
         for k in range(steps):
             self._tau = self._tau + self._share * (demand - self._tau)
@@ -42,5 +41,4 @@ class _Amplifier(AbstractAmplifier):
         return torques
 
     def electric(self, trace: Trace, dt: Array) -> Electric:
-        del trace  # it has no currents
         return Electric(*np.zeros((6, *dt.shape)))

@@ -18,7 +18,6 @@ class Starter(AbstractEncoder):
 
     def start(self, n: int, samples: int, fs: float, rngs: Sequence[np.random.Generator]) -> AbstractReader:
         """Return the encoders of `n` joints; a generator for each simulation, so that none depends on the others."""
-        del fs
         return _Reader(self.noise * np.stack([rng.standard_normal((samples, n)) for rng in rngs], axis=1))
 
     def spread(self, n: int) -> Array:

@@ -25,7 +25,6 @@ class Starter(AbstractExcitation):
 
     def random(self, rng: np.random.Generator, plan: Plan, duration: float, frequency: float) -> Array:
         """Return random coefficients, shape (m, joint)."""
-        del duration, frequency
         return rng.standard_normal((plan.states.count, len(plan.limits.velocity)))
 
     def trajectory(self, c: Array, middle: Array, duration: float, repeat: int) -> Fourier:

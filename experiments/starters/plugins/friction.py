@@ -17,7 +17,6 @@ class Starter(AbstractFrictionLaw):
 
     def start(self, plant: Batch, Fs: Array, h: float) -> AbstractContact:
         """Return the friction at work."""
-        del plant, Fs, h
         return _Contact(self.drag)
 
 

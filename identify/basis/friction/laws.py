@@ -24,7 +24,6 @@ class ViscousFriction(AbstractFriction):
 
     def force(self, q: Array, qd: Array) -> Array:
         """Return qd."""
-        del q
         return qd
 
 
@@ -37,7 +36,6 @@ class AsymmetricViscousFriction(AbstractFriction):
 
     def force(self, q: Array, qd: Array) -> Array:
         """Return |qd|."""
-        del q
         return np.abs(qd)
 
 
@@ -51,7 +49,6 @@ class CoulombFriction(AbstractFriction):
 
     def force(self, q: Array, qd: Array) -> Array:
         """Return sign(qd)."""
-        del q
         return np.sign(qd)
 
 
@@ -71,7 +68,6 @@ class TanhFriction(AbstractFriction):
 
     def force(self, q: Array, qd: Array) -> Array:
         """Return tanh(qd/vt)."""
-        del q
         return np.tanh(qd / self.vt)
 
 
@@ -88,7 +84,6 @@ class ArctanFriction(AbstractFriction):
 
     def force(self, q: Array, qd: Array) -> Array:
         """Return 2/pi arctan(qd/vat)."""
-        del q
         return 2 / np.pi * np.arctan(qd / self.vat)
 
 
@@ -150,5 +145,4 @@ class Offset(AbstractFriction):
 
     def force(self, q: Array, qd: Array) -> Array:
         """Return ones."""
-        del q
         return np.ones_like(qd)

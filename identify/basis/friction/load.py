@@ -27,7 +27,6 @@ class TiedFriction(AbstractBlock):
 
     def parameters(self, n: int) -> tuple[Parameter, ...]:
         """Return Fsx."""
-        del n
         return (self._own,)
 
     def explicit(self, state: State) -> BlockColumns:

@@ -137,7 +137,6 @@ class PowerFriction(AbstractFriction):
 
     def force(self, q: Array, qd: Array) -> Array:
         """Return |qd|^exponent sign(qd)."""
-        del q
         return np.abs(qd) ** self.exponent * np.sign(qd)
 
 
@@ -163,7 +162,6 @@ class StribeckFriction(AbstractFriction):
 
     def force(self, q: Array, qd: Array) -> Array:
         """Return exp(-(|qd|/vs)^exponent) sign(qd)."""
-        del q
         return np.exp(-((np.abs(qd) / self.vs) ** self.exponent)) * np.sign(qd)
 
 

@@ -22,7 +22,6 @@ class Steps:
         comparable : bool
             Whether the round is one of those that follow: the first may have been another one.
         """
-        del comparable
         return _largest((G - X) / unit), G
 
 

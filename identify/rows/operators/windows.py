@@ -19,12 +19,10 @@ class Samples(AbstractLowPass):
 
     def step(self, fs: float) -> int:
         """Return 1."""
-        del fs
         return 1
 
     def halo(self, fs: float) -> float:
         """Return 0."""
-        del fs
         return 0.0
 
     def window(self, fs: float, grid: Grid) -> Window:
@@ -33,7 +31,6 @@ class Samples(AbstractLowPass):
 
     def response(self, fs: float) -> Array:
         """Return a single one."""
-        del fs
         return np.ones(1)
 
 
