@@ -28,8 +28,7 @@ ALLOWED = {
 }
 
 ALLOWED_IN = {
-    "experiments/cli/app.py": {"tyro"},
-    "experiments/cli/parser.py": {"tyro"},
+    "experiments/cli/parser.py": {"cyclopts"},
     "identify/files/arrow.py": {"pyarrow"},
     "identify/files/log_file.py": {"pyarrow"},
     "identify/files/ros_bag.py": {"rosbags"},

@@ -1,17 +1,12 @@
 """Running a command: its words, its errors, its end."""
 
 import os
-import re
 import sys
 from collections.abc import Callable, Sequence
-from contextlib import redirect_stdout, suppress
-from io import StringIO
-
-import tyro
-from tyro.extras import SubcommandApp
+from contextlib import suppress
+from typing import Literal
 
 from idbench.experiments.cli.interruption import INTERRUPTED, Notice, TerminatedError, importing, noticing, terminating
-from idbench.experiments.cli.parser import typed, untyped
 from idbench.experiments.errors import ExperimentError, is_told, reason, report, visible
 
 DESCRIPTION = "A MuJoCo testbench for the dynamic identification of robots."
@@ -58,7 +53,9 @@ def run(args: Sequence[str] | None = None) -> int:
                 _print(OVERVIEW)
             else:
                 with importing():
-                    command = parsed(words)
+                    from idbench.experiments.cli.parser import parsed
+
+                    command = parsed(words, COMMANDS, DESCRIPTION)
                 if command is not None:
                     _do(command)
     except KeyboardInterrupt:
@@ -85,48 +82,11 @@ def _require_memory() -> None:
             )
 
 
-def parsed(words: list[str]) -> Callable[[], None] | None:
-    """Return the command that words name, with its options, or None if they asked for its help, which is shown."""
-    from idbench.experiments.cli.parser import refused, require_command, require_once, show_help, without_short
-
-    require_command(words, COMMANDS)
-    if show_help(words, COMMANDS):
-        return None
-    words = without_short(words)
-    require_once(words)
-    with refused(words, COMMANDS):
-        made: Callable[[], None] = untyped(_parsed(words))
-    return made
-
-
-def _parsed(words: list[str]) -> object:
-    """Return what the library makes of words; the list of all commands needs nothing of their options."""
-    if words[0] in COMMANDS:
-        return tyro.cli(typed(COMMANDS[words[0]]), prog=f"idbench {words[0]}", args=words[1:])
-    return _together().cli(prog="idbench", description=DESCRIPTION, args=words)
-
-
-def _together() -> SubcommandApp:
-    """Return all commands as one."""
-    every = SubcommandApp()
-    for name, options in COMMANDS.items():
-        every.command(name=name)(options)
-    return every
-
-
-def completion(shell: str) -> str:
+def completion(shell: Literal["bash", "zsh", "fish"]) -> str:
     """Return the script that lets bash, zsh or fish complete commands and options."""
-    script, every = StringIO(), SubcommandApp()
-    for name, options in COMMANDS.items():
-        every.command(name=name)(typed(options))
-    with redirect_stdout(script), suppress(SystemExit):  # the parser ends its process after the script
-        every.cli(prog="idbench", args=["--tyro-print-completion", shell])
-    # Files, where there are no words: bash completes them by itself if it is given nothing.
-    found = script.getvalue().replace("complete -F ", "complete -o default -F ")
-    found = found.replace('COMPREPLY=($(compgen -f -- "$cur"))', "COMPREPLY=()")
-    found = found.replace('[[ "$completions" ==', '[[ -z "$completions" || "$completions" ==')
-    # What an option has without a word is no word of it.
-    return re.sub(r"'None', |, 'None'(?=\])", "", found.replace("{None}|", "").replace("{None,", "{"))
+    from idbench.experiments.cli.parser import every_command
+
+    return every_command(COMMANDS, DESCRIPTION).generate_completion(shell=shell)
 
 
 def command(name: str) -> Callable[[type], type]:

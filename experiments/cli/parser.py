@@ -1,61 +1,129 @@
-"""Words of a command that it does not take, each said in one line."""
+"""Words of a command become its options; what is wrong with them is said in one line."""
 
+import ast
 import re
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from dataclasses import MISSING, dataclass, field, fields, is_dataclass
 from difflib import get_close_matches
-from inspect import cleandoc
-from itertools import takewhile
+from inspect import Parameter as Signature
+from inspect import cleandoc, getsource
+from itertools import pairwise, takewhile
+from textwrap import dedent
 from types import UnionType
-from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
 
-import tyro
-from tyro import _errors as parser  # private: tyro has no other way to say what is wrong in words of one's own
-from tyro import _strings  # private: tyro keeps the line breaks of texts that are indented, as ours are
-from tyro.constructors import PrimitiveConstructorSpec
+from cyclopts import App, Group, Parameter
+from cyclopts.exceptions import CoercionError, CycloptsError, MissingArgumentError, UnknownOptionError, UnusedCliTokensError
 
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.program import program
 from idbench.experiments.requests.words import Word
 
+ALL = "--help-all"
+HELP = ("-h", "--help")
+KINDS: Mapping[type, str] = {int: "a whole number", float: "a number"}  # What options take, in words
+COUNTS = ("", "", "two", "three", "four", "five", "six")  # Numbers of values that an option takes
+CLOSE = 0.7  # Likeness of words from which on one is taken for a slip of the other
 
-def typed(request: type, shown: Container[str] | None = None) -> type:
-    """Return a request with the marks of the library on its fields; the help has all of them, or those that are `shown`."""
-    hints = get_type_hints(request, include_extras=True)
-    marked = dict[str, Any]()
-    defaults = dict[str, Any]()
-    for each in fields(request):
+
+def app_of(name: str, options: type, shown: Container[str] | None = None, place: int | None = None) -> App:
+    """The command of a class of options; its help has all of them, or those that are `shown`."""
+    app = _app(name, options.__doc__ or "", place)
+    marked = _marked(options, shown)
+
+    def made(asked: Annotated[marked, Parameter(name="*")]) -> Any:  # type: ignore[valid-type]
+        return _unmarked(asked)
+
+    if all(each.default is not MISSING or each.default_factory is not MISSING for each in fields(marked)):
+        made.__defaults__ = (marked(),)
+    app.default(made)
+    return app
+
+
+def _app(name: str, text: str, place: int | None = None) -> App:
+    return App(
+        name,
+        joined(text),
+        help_format="plaintext",
+        version_flags=(),
+        result_action="return_value",
+        group_commands=Group("Help" if place is None else "Commands", sort_key=9),
+        group_parameters=Group("Options"),
+        sort_key=place,
+    )
+
+
+def joined(text: str) -> str:
+    """A text with its paragraphs in one line each."""
+    return re.sub(r"(?<!\n)\n(?!\n)", " ", cleandoc(text))
+
+
+def texts_of(options: type) -> dict[str, str]:
+    """What fields of a dataclass are, by the texts below them."""
+    found = dict[str, str]()
+    for owner in filter(is_dataclass, reversed(options.__mro__)):
+        (made,) = ast.parse(dedent(getsource(owner))).body
+        for each, below in pairwise(made.body if isinstance(made, ast.ClassDef) else []):
+            if isinstance(each, ast.AnnAssign) and isinstance(below, ast.Expr) and isinstance(below.value, ast.Constant):
+                found[ast.unparse(each.target)] = joined(str(below.value.value))
+    return found
+
+
+def _marked(options: type, shown: Container[str] | None) -> type:
+    """A class of options with the marks of the library on its fields; those that are typed without a name come first."""
+    hints = get_type_hints(options, include_extras=True)
+    texts = texts_of(options)
+    annotations = dict[str, Any]()
+    space = dict[str, Any]()
+    for each in fields(options):
         hint = hints[each.name]
-        default = each.default
-        hidden = shown is not None and each.name not in shown
-        made, marks = _plain(hint), _marks(hint, default)
+        word = word_of(hint)
         if (inner := group_of(hint)) is not None:
-            made, marks = typed(inner, shown), [tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcommandPrefixes]
-            hidden = shown is not None and not any(f.name in shown for f in fields(inner))
-            defaults[each.name] = field(default_factory=made)
-        elif default is not MISSING:
-            defaults[each.name] = default
-        marks += [tyro.conf.Suppress] if hidden else []
-        marked[each.name] = Annotated[(made, *marks)] if marks else made
-    space = {"__annotations__": marked, "__doc__": request.__doc__, "__module__": request.__module__, **defaults}
-    return dataclass(frozen=True, kw_only=True)(type(request.__name__, (request,), space))
+            annotations[each.name] = Annotated[_marked(inner, shown), Parameter(name="*")]
+            space[each.name] = field(default_factory=get_args(annotations[each.name])[0], kw_only=True)
+            continue
+        plain, visible = _plain(hint), shown is None or each.name in shown
+        several = get_origin(plain) is tuple
+        parameter = Parameter(
+            name=[
+                *([] if word.positional else [f"--{word.option or each.name.replace('_', '-')}"]),
+                *filter(None, [word.short]),
+            ]
+            or None,
+            help=texts.get(each.name),
+            metavar=word.metavar or None,
+            negative=None if plain is bool and not word.flag else (),
+            consume_multiple=True if several and not word.positional else None,
+            show=visible,
+            show_default=_default if each.default not in (None, (), MISSING, False) else False,
+            show_choices=get_origin(plain) is Literal,
+        )
+        annotations[each.name] = Annotated[plain, parameter]
+        space[each.name] = field(default=each.default, kw_only=not word.positional)
+    space |= {"__annotations__": annotations, "__doc__": options.__doc__, "__module__": options.__module__}
+    made: Any = dataclass(frozen=True)(type(options.__name__, (options,), space))
+    made.__dataclass_fields__ = dict(sorted(made.__dataclass_fields__.items(), key=lambda each: each[1].kw_only is True))
+    return made
 
 
-def untyped(made: Any) -> Any:
-    """Return what the library made as the request that it is."""
+def _default(value: Any) -> str:
+    return " ".join(map(str, value)) if isinstance(value, tuple) else str(value)
+
+
+def _unmarked(made: Any) -> Any:
+    """Options as the class that they are."""
     values = {f.name: getattr(made, f.name) for f in fields(made)}
-    return type(made).__mro__[1](**{name: untyped(x) if is_dataclass(x) else x for name, x in values.items()})
+    return type(made).__mro__[1](**{name: _unmarked(x) if is_dataclass(x) else x for name, x in values.items()})
 
 
 def group_of(hint: Any) -> Any:
-    """Return the dataclass of a group of options, or None of a single one."""
+    """The dataclass of a group of options, or None of a single one."""
     first = _plain(hint)
     return first if is_dataclass(first) else None
 
 
 def word_of(hint: Any) -> Word:
-    """Return how a value of a type is typed."""
+    """How a value of a type is typed."""
     return next((mark for mark in getattr(hint, "__metadata__", ()) if isinstance(mark, Word)), Word())
 
 
@@ -63,105 +131,61 @@ def _plain(hint: Any) -> Any:
     return get_args(hint)[0] if get_origin(hint) is Annotated else hint
 
 
-def _marks(hint: Any, default: object) -> list[Any]:
-    """Return what the library knows of a field: metavar, name, the value that one word becomes."""
-    word = word_of(hint)
-    metavar, unsaid = word.metavar if word.made is None else "", default is None or default == ()
-    marks = list[Any]()
-    if metavar or word.option or word.short or unsaid:
-        said = "" if unsaid else None
-        short = [word.short] if word.short else None
-        marks.append(tyro.conf.arg(name=word.option or None, aliases=short, metavar=metavar or None, help_behavior_hint=said))
-    if word.made is not None:
-        marks.append(_one(word))
-    if word.positional:
-        marks.append(tyro.conf.Positional)
-    if word.flag:
-        marks.append(tyro.conf.FlagCreatePairsOff)
-    return marks
+def every_command(commands: Mapping[str, type], description: str) -> App:
+    """All commands as one."""
+    every = _app("idbench", description)
+    for place, (name, options) in enumerate(commands.items()):
+        every.command(app_of(name, options, None, place))
+    return every
 
 
-def _one(word: Word) -> PrimitiveConstructorSpec[Any]:
-    made = word.made or str
-    return PrimitiveConstructorSpec(
-        nargs=1,
-        metavar=word.metavar,
-        instance_from_str=lambda words: made(words[0]),
-        is_instance=lambda _: True,
-        str_from_instance=lambda value: [] if value is None else [str(value)],
-        choices=word.known or None,
-    )
+def parsed(words: Sequence[str], commands: Mapping[str, type], description: str) -> Any:
+    """The options that words name, or None if they asked for help, which is shown.
 
-
-ALL = "--help-all"
-HELP = ("-h", "--help")
-
-
-def _joined(helptext: str) -> str:
-    """Return a text with its paragraphs in one line each."""
-    return re.sub(r"(?<!\n)\n(?!\n)", " ", cleandoc(helptext))
-
-
-_strings.remove_single_line_breaks = _joined
-
-
-def show_help(words: Sequence[str], commands: Mapping[str, type]) -> bool:
-    """Print the short help of a command that has one, and return whether it was asked for."""
-    options = commands.get(words[0])
+    Raises
+    ------
+    ExperimentError
+        If something is wrong with the words: it says what to type instead.
+    """
+    _require_command(words, commands)
+    if words[0] in HELP:
+        every_command(commands, description).help_print([])
+        return None
+    name, rest = words[0], list(words[1:])
+    options = commands[name]
     essential: tuple[str, ...] = getattr(options, "essential", ())
-    if options is None or not essential or not set(words[1:]) & set(HELP):
-        return False
+    asked = {ALL, *HELP} & set(rest)
+    app = app_of(f"idbench {name}", options, essential or None if ALL not in asked else None)
+    if asked:
+        app.help_print([])
+        if essential and ALL not in asked:
+            print(f"{_hidden(options, essential)} more options: idbench {name} {ALL}")  # noqa: T201  # as the library prints
+        return None
+    _require_once(rest)
     try:
-        tyro.cli(typed(options, essential), prog=f"idbench {words[0]}", args=["--help"])
-    except SystemExit:
-        print(f"{_hidden(options, essential)} more options: idbench {words[0]} {ALL}")  # noqa: T201  # as the parser prints
-    return True
+        made, bound, _ = app.parse_args(rest, exit_on_error=False, print_error=False)
+    except CycloptsError as error:
+        raise ExperimentError(_said(error, words, options)) from None
+    return made(*bound.args, **bound.kwargs)
 
 
-def without_short(words: Sequence[str]) -> list[str]:
-    """Return words that ask the parser for all of its help."""
-    return ["--help" if word == ALL else word for word in words]
-
-
-def _hidden(options: type, names: Sequence[str]) -> int:
-    """Return how many options are not shown."""
+def _hidden(options: type, names: Container[str]) -> int:
+    """How many options are not shown."""
     hints = get_type_hints(options, include_extras=True)
-    count = 0
-    for each in fields(options):
-        if (inner := group_of(hints[each.name])) is not None:
-            count += _hidden(inner, names)
-        else:
-            count += each.name not in names
-    return count
+    inner = {each.name: group_of(hints[each.name]) for each in fields(options)}
+    return sum(_hidden(group, names) if group else name not in names for name, group in inner.items())
 
 
-KINDS: Mapping[type, str] = {int: "a whole number", float: "a number"}  # What options take, in words
-CLOSE = 0.7  # Likeness of words from which on one is taken for a slip of the other
-COUNTS = ("", "", "two", "three", "four", "five", "six")  # Numbers of values that an option takes
-
-
-@contextmanager
-def refused(words: Sequence[str], commands: Mapping[str, type]) -> Iterator[None]:
-    """Turn errors of the parser into ExperimentErrors of one line."""
-
-    def refuse(event: parser.ParseErrorEvent) -> None:
-        raise ExperimentError(_said(event, words, commands))
-
-    with parser.on_parse_error(refuse):
-        yield
-
-
-def require_command(words: Sequence[str], commands: Mapping[str, type]) -> None:
-    """Raise ExperimentError if the first word is no command."""
-    if words[0] in commands or words[0] in ("-h", "--help"):
+def _require_command(words: Sequence[str], commands: Mapping[str, type]) -> None:
+    if words[0] in commands or words[0] in HELP:
         return
     if words[0].startswith("-"):
         raise ExperimentError(f"{words[0]}: name a command first; known: {', '.join(commands)}")
     raise ExperimentError(f"no command {words[0]!r}{did_you_mean(words[0], commands)}; known: {', '.join(commands)}")
 
 
-def require_once(words: Sequence[str]) -> None:
-    """Raise ExperimentError if an option is given twice: the parser would take the last, and drop the others."""
+def _require_once(words: Sequence[str]) -> None:
+    """Raise ExperimentError if an option is given twice: the values of the first would be lost, or joined."""
     places = [k for k, word in enumerate(words) if word.startswith("--") and word != "--"]
     options = [words[k].partition("=")[0].replace("_", "-") for k in places]
     if twice := next((option for k, option in enumerate(options) if option in options[:k]), None):
@@ -170,57 +194,53 @@ def require_once(words: Sequence[str]) -> None:
         raise ExperimentError(f"{twice} is given twice: give it once, and all its values if it takes several: {once}")
 
 
-def _said(event: parser.ParseErrorEvent, words: Sequence[str], commands: Mapping[str, type]) -> str:
-    """Return what is wrong, and what to type instead."""
-    name = words[0]
-    help_ = f"{program()} {name} --help-all" if name in commands else f"{program()} --help"
-    match event:
-        case parser.InvalidChoice():
-            known = sorted(choice for choice in event.choices if choice != "None")
-            hint = did_you_mean(event.value, known)
-            said = f"{_called(event.argument)} {event.value}: no such choice{hint}; known: {', '.join(known)}"
-        case parser.InstantiationFailure() if event.argument is not None:
-            option = _called(event.argument)
-            given = " ".join([option, *_given(option, words)])
-            said = f"{given}: give {_wanted(event.argument)}: {_help(event.argument)}"
-        case parser.BadValue():
-            said = f"{_called(event.argument)} needs {_wanted(event.argument)}: {help_} tells more"
-        case parser.MissingArgs():
-            missing = ", ".join(_called(each.arg) for each in event.missing_arguments)
-            said = f"{name} needs {missing}; {help_} tells more"
-        case parser.UnrecognizedArgs():
-            said = _unknown(event.tokens[0], name, commands) + help_ + " lists all"
-        case _:
-            said = f"{' '.join(words)}: {getattr(event, 'message', type(event).__name__)}; {help_} tells more"
+def _said(error: CycloptsError, words: Sequence[str], options: type) -> str:
+    """What is wrong, and what to type instead."""
+    name, argument = words[0], error.argument
+    help_ = f"{program()} {name} {ALL}"
+    if isinstance(error, UnknownOptionError):
+        known = sorted(_options(options))
+        word = next((w for w in words[1:] if w.startswith("-") and w.partition("=")[0] not in known), words[-1])
+        return f"{name} has no option {word}{did_you_mean(word, known)}; {help_} lists all"
+    if isinstance(error, UnusedCliTokensError):
+        return f"{name} takes no further word {(error.unused_tokens or ['?'])[0]!r}: {help_} lists all"
+    if argument is None:
+        return f"{' '.join(words)}: {' '.join(str(error).split())}; {help_} tells more"
+    called, kind = _called(argument), _kind(argument)
+    if isinstance(error, CoercionError) and error.token is not None and get_origin(kind) is Literal:
+        value, known = error.token.value, [str(x) for x in get_args(kind)]
+        said = f"{called} {value}: no such choice{did_you_mean(value, known)}; known: {', '.join(sorted(known))}"
+    elif isinstance(error, CoercionError) or _given(called, words):
+        given = " ".join([called, *_given(called, words)])
+        said = f"{given}: give {_wanted(argument)}: {' '.join(str(argument.parameter.help).split())}"
+    elif isinstance(error, MissingArgumentError) and not argument.tokens and not error.keyword:
+        required = [each.name for each in fields(options) if each.default is MISSING and each.default_factory is MISSING]
+        said = f"{name} needs {', '.join(required[required.index(called) :])}; {help_} tells more"
+    else:
+        said = f"{called} needs {_wanted(argument)}: {help_} tells more"
     return said
 
 
-def _unknown(word: str, name: str, commands: Mapping[str, type]) -> str:
-    """Return which word a command does not know."""
-    if not word.startswith("-"):
-        return f"{name} takes no further word {word!r}: "
-    options = sorted(_options(commands[name])) if name in commands else ["--help", "--version"]
-    return f"{name} has no option {word}{did_you_mean(word.partition('=')[0], options)}; "
-
-
 def did_you_mean(word: str, known: Iterable[str]) -> str:
-    """Return the nearest known word as a question, as `idbench.identify.plugins` does, which loads NumPy."""
-    near = get_close_matches(word.lower(), list(known), 1, CLOSE)
+    """The nearest known word as a question, as `idbench.identify.plugins` makes it, which loads NumPy."""
+    near = get_close_matches(word.partition("=")[0].lower(), list(known), 1, CLOSE)
     return f" (did you mean {near[0]!r}?)" if near else ""
 
 
 def _called(argument: Any) -> str:
-    return str(argument.field.intern_name) if argument.is_positional() else str(argument.lowered.name_or_flags[0])
+    named = argument.field_info.kind is Signature.KEYWORD_ONLY
+    return str(argument.name) if named else str(argument.keys[-1] if argument.keys else argument.name)
 
 
-def _help(argument: Any) -> str:
-    """Return what an option is, in one line."""
-    text = argument.field.helptext
-    return " ".join(str((text() if callable(text) else text) or "").split())
+def _kind(argument: Any) -> Any:
+    """The type of a value, without None."""
+    stated = _plain(argument.hint)
+    union = get_origin(stated) in (Union, UnionType)
+    return next(t for t in (get_args(stated) if union else (stated,)) if t is not type(None))
 
 
 def _given(option: str, words: Sequence[str]) -> list[str]:
-    """Return the words that were given to an option."""
+    """The words that were given to an option."""
     plain = [word.replace("_", "-") if word.startswith("--") else word for word in words]
     for k, word in enumerate(plain):
         if word == option:
@@ -231,26 +251,22 @@ def _given(option: str, words: Sequence[str]) -> list[str]:
 
 
 def _wanted(argument: Any) -> str:
-    """Return what an option takes, in words."""
-    stated = argument.field.type_stripped
-    union = get_origin(stated) in (Union, UnionType)
-    types = [t for t in (get_args(stated) if union else (stated,)) if t is not type(None)]
-    inner = get_args(types[0]) or tuple(types)
-    kind = next((t for t in inner if t in KINDS), None)
-    if kind is None:
-        return str(argument.lowered.metavar)
+    """What an option takes, in words."""
+    kind = _kind(argument)
+    inner = get_args(kind) or (kind,)
+    number = next((t for t in inner if t in KINDS), None)
+    if number is None:
+        return str(argument.parameter.metavar or getattr(kind, "__name__", kind).upper())
     if len(inner) > 1 and inner[-1] is not Ellipsis:
-        return f"{COUNTS[len(inner)]} {KINDS[kind].split()[-1]}s"
-    several = Ellipsis in inner or argument.lowered.nargs == "*"
-    return f"{KINDS[kind].removeprefix('a ')}s" if several else KINDS[kind]
+        return f"{COUNTS[len(inner)]} {KINDS[number].split()[-1]}s"
+    return f"{KINDS[number].removeprefix('a ')}s" if Ellipsis in inner else KINDS[number]
 
 
 def _options(command: Any) -> Iterator[str]:
-    """Yield the options of a command, those of its groups, too."""
+    """The options of a command, those of its groups, too."""
     hints = get_type_hints(command)
     for each in fields(command):
-        hint = hints[each.name]
-        if is_dataclass(hint):
+        if is_dataclass(hint := hints[each.name]):
             yield from _options(hint)
         else:
             name = each.name.replace("_", "-")

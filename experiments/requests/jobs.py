@@ -200,7 +200,7 @@ class RunRequest:
     see docs/estimators.md."""
     start: Start = "least-squares"
     """Where estimators that simulate or filter start: at the least-squares estimate, or at the robot's file."""
-    study: Annotated[Path | None, Word("DIR", Path, option="from")] = None
+    study: Annotated[Path | None, Word("DIR", option="from")] = None
     """Repeat one run of a study, given by its folder, instead of a scenario."""
     index: Count = None
     """Number of that run. Its rows must have the same bits."""
@@ -217,7 +217,7 @@ class RunRequest:
 class StudyRequest:
     """Simulate a scenario over a grid and many seeds, and identify each run."""
 
-    study: Annotated[str | None, Word("STUDY", str, positional=True, file=True)] = None
+    study: Annotated[str | None, Word("STUDY", positional=True, file=True)] = None
     """Name of a shipped study, or its file (TOML)."""
     resume: Folder = None
     """Folder of an interrupted study: run what is missing, and make the report again."""

@@ -1,13 +1,9 @@
 """Requests from tables of keys: TOML files and keyword arguments; every value is checked by the type of its field."""
 
-import json
-import shlex
-import tomllib
-from collections.abc import Container, Iterator, Mapping
+from collections.abc import Container, Mapping
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Annotated, Any, TypeVar, get_args, get_origin, get_type_hints
-from xml.etree import ElementTree
 
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
@@ -68,46 +64,6 @@ def request_from(
     return request(**values, **{name: replace(defaults[name], **inner) for name, inner in groups.items()})  # type: ignore[type-var]
 
 
-def files_named(request: Any, folder: Path = Path()) -> tuple[Path, ...]:
-    """Return the files that a request names, and those that these name in turn: parts of robots, meshes, scenarios."""
-    found, todo = set[Path](), [folder / path for path in _named(request)]
-    while todo:
-        path = todo.pop()
-        if path not in found and path.is_file():
-            found.add(path)
-            todo += _named_by(path)
-    return tuple(sorted(found))
-
-
-def as_table(request: Any, words: str, taken: Container[str] = ()) -> str:
-    """Return options of a command line as keys in one line of TOML; nothing that they name is loaded."""
-    known = request_keys(request)
-    found = dict[str, Any]()
-    key = ""
-    for word in shlex.split(words):
-        if word.startswith("--"):
-            key, mark, value = word[2:].partition("=")
-            key, off = key.replace("-", "_").removeprefix("no_"), key.startswith("no-")
-            found[key] = [value] if mark else not off
-        elif key:
-            found[key] = [*(found[key] if isinstance(found[key], list) else []), word]
-    made = {name: _as_value(known[name][1], value) for name, value in found.items() if name in known and name not in taken}
-    return ", ".join(f"{name} = {json.dumps(value)}" for name, value in made.items())
-
-
-def _as_value(hint: Any, words: Any) -> Any:
-    """Return words of an option as a value of a type; as they are where they are none."""
-    if isinstance(words, bool):
-        return words
-    several = get_origin(_plain(hint)) is tuple or "tuple" in str(_plain(hint))
-    number = "float" in str(_plain(hint)) or "int" in str(_plain(hint))
-    try:
-        values = [float(word) if number else word for word in words]
-    except ValueError:
-        values = words
-    return values if several and len(values) > 1 else values[0] if values else ""
-
-
 def _plain(hint: Any) -> Any:
     return get_args(hint)[0] if get_origin(hint) is Annotated else hint
 
@@ -143,43 +99,3 @@ def _in_folder(value: Any, hint: Any, folder: Path | None) -> Any:
 
 def _names_file(hint: Any) -> bool:
     return any(isinstance(mark, Word) and mark.file for mark in getattr(hint, "__metadata__", ()))
-
-
-def _named(request: Any) -> Iterator[Path]:
-    """Yield the files that a request names."""
-    for place, hint in request_keys(type(request)).values():
-        value = request
-        for name in place:
-            value = getattr(value, name)
-        if _names_file(hint) and value:
-            yield from map(Path, value if isinstance(value, tuple) else (value,))
-
-
-def _named_by(path: Path) -> Iterator[Path]:
-    """Yield the files that a robot, a scenario or a layout names: they are there, or nobody reads them."""
-    try:
-        texts = set(_texts(path))
-    except (ElementTree.ParseError, tomllib.TOMLDecodeError, UnicodeDecodeError, OSError, RecursionError):
-        return
-    for text in texts:
-        for place in (path.parent, *(path.parent / other for other in texts if len(other) < 200)):
-            try:
-                if (place / text).is_file():
-                    yield place / text
-            except (OSError, ValueError):  # too long, or no name
-                break
-
-
-def _texts(path: Path) -> Iterator[str]:
-    """Yield what may name files: attributes of XML that do, all texts of TOML."""
-    if path.suffix in (".xml", ".urdf"):
-        for _, element in ElementTree.iterparse(path):
-            names = ("file", "filename", "meshdir", "texturedir", "assetdir")
-            yield from (element.attrib[name].removeprefix("package://") for name in names if name in element.attrib)
-    elif path.suffix == ".toml":
-        todo: list[Any] = [tomllib.loads(path.read_text(encoding="utf-8"))]
-        while todo:
-            part = todo.pop()
-            todo += part.values() if isinstance(part, dict) else part if isinstance(part, list) else ()
-            if isinstance(part, str):
-                yield part

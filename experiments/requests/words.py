@@ -1,9 +1,8 @@
 """Types of requests, with what a value is called where it is typed; no library of command lines is needed for them."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 
 @dataclass(frozen=True)
@@ -12,10 +11,6 @@ class Word:
 
     metavar: str = ""
     """What it is called."""
-    made: Callable[[str], Any] | None = None
-    """What one word becomes; without it, the word None would mean that nothing is given."""
-    known: tuple[str, ...] = ()
-    """The words that there are."""
     option: str = ""
     """Name of its option, where that is not the field's."""
     positional: bool = False
@@ -28,21 +23,21 @@ class Word:
     """Whether it names a file: what a file names is looked for beside that file."""
 
 
-File = Annotated[Path | None, Word("FILE", Path, file=True)]
-Folder = Annotated[Path | None, Word("DIR", Path)]
-Hertz = Annotated[float | None, Word("HZ", float)]
-Seconds = Annotated[float | None, Word("SECONDS", float)]
-Real = Annotated[float | None, Word("FLOAT", float)]
-Count = Annotated[int | None, Word("N", int)]
-Robot = Annotated[str | None, Word("NAME|FILE", str, file=True)]
+File = Annotated[Path | None, Word("FILE", file=True)]
+Folder = Annotated[Path | None, Word("DIR")]
+Hertz = Annotated[float | None, Word("HZ")]
+Seconds = Annotated[float | None, Word("SECONDS")]
+Real = Annotated[float | None, Word("FLOAT")]
+Count = Annotated[int | None, Word("N")]
+Robot = Annotated[str | None, Word("NAME|FILE", file=True)]
 ThisRobot = Annotated[str, Word(positional=True, file=True)]
-Scenario = Annotated[str | None, Word("SCENARIO", str, file=True)]
-ThisScenario = Annotated[str | None, Word("SCENARIO", str, positional=True, file=True)]
-Url = Annotated[str | None, Word("URL", str)]
-Delay = Annotated[str | None, Word("SECONDS|estimate|joints", str)]
+Scenario = Annotated[str | None, Word("SCENARIO", file=True)]
+ThisScenario = Annotated[str | None, Word("SCENARIO", positional=True, file=True)]
+Url = Annotated[str | None, Word("URL")]
+Delay = Annotated[str | None, Word("SECONDS|estimate|joints")]
 Percent = Annotated[str | None, Word("PERCENT")]
 Meaning = Literal["held", "instantaneous", "averaged"]
-Torque = Annotated[Meaning | None, Word("held|instantaneous|averaged", str, ("held", "instantaneous", "averaged"))]
+Torque = Annotated[Meaning | None, Word("held|instantaneous|averaged")]
 Start = Literal["least-squares", "file"]
 """Where estimators begin that simulate or filter: at the least-squares estimate, or at the parameters of the robot's file."""
 Way = Literal["all", "together", "fixed", "apart", "difference"]
