@@ -95,7 +95,7 @@ def _marked(options: type, shown: Container[str] | None) -> type:
             negative=None if plain is bool and not word.flag else (),
             consume_multiple=True if several and not word.positional else None,
             show=visible,
-            show_default=_default if each.default not in (None, (), MISSING, False) else False,
+            show_default=_default if each.default not in (None, (), "", MISSING, False) else False,
             show_choices=get_origin(plain) is Literal,
         )
         annotations[each.name] = Annotated[plain, parameter]

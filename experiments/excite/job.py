@@ -14,7 +14,6 @@ from idbench.experiments.requests.jobs import ExciteRequest
 from idbench.identify import MotionLog, TorqueChannel
 from idbench.sim.encoders import IncrementalEncoder
 from idbench.sim.limits.motion_limits import MotionLimits, limits_of
-from idbench.sim.robot.robot import Robot
 from idbench.sim.scenario.measurement import TorqueMeasurement
 from idbench.sim.scenario.scenario import Scenario
 from idbench.sim.scenario.scenario_file import load
@@ -41,11 +40,6 @@ def excited(asked: ExciteRequest, progress: Callable[[float], None]) -> tuple[Ex
         return Excited.of(design, progress), None
     sequence = MotionSequence.of(design, share, progress)
     return sequence.last, sequence
-
-
-def files_of(asked: ExciteRequest) -> tuple[Path, ...]:
-    """Return the files that are read, which nothing may be written over."""
-    return (Robot.path(asked.robot), *asked.log, *([asked.limits] if asked.limits else []))
 
 
 def designed(asked: ExciteRequest) -> Design:

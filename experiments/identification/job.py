@@ -24,7 +24,6 @@ from idbench.experiments.requests.shared import CHAIN, LogRequest
 from idbench.identify import ESTIMATORS, MODELS, IdentificationError
 from idbench.identify.models import THREE
 from idbench.identify.signals.masks import NoMask
-from idbench.sim.robot.robot import Robot
 from idbench.sim.scenario.scenario_file import load as load_scenario
 
 
@@ -77,14 +76,6 @@ def _wdyn(stated: float | None, scenarios: Sequence[Path]) -> tuple[float, str] 
         return stated, "as stated"
     found = next((load_scenario(str(path)).wdyn for path in scenarios if path.is_file()), None)
     return None if found is None else (found, CONTROLLER)
-
-
-def files_of(asked: IdentifyRequest) -> tuple[Path, ...]:
-    """Return the files that are read, which nothing may be written over."""
-    logs = [file_of(path).absolute() for path in (*asked.log, *asked.validate)]
-    named = (asked.chain_file, asked.reading.layout, *asked.loop)
-    more = [Path(name) for name in named if name is not None]
-    return (*logs, Robot.path(robot_of(asked)), *(path.absolute() for path in more if path.suffix))
 
 
 def robot_of(asked: IdentifyRequest) -> str:

@@ -13,7 +13,6 @@ from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.friction_choice import chosen_friction, words
 from idbench.experiments.identification.job import read_options
 from idbench.experiments.identification.load import in_band, load
-from idbench.experiments.identification.reading import file_of
 from idbench.experiments.identification.request import Request
 from idbench.experiments.identification.robot_model import RobotModel, absolute
 from idbench.experiments.loads.known_load import LoadJudgement, payload_parameters
@@ -25,7 +24,6 @@ from idbench.identify import Array, IdentificationError
 from idbench.identify.loads.drive_gains import GainEstimate, identify_drive_gains
 from idbench.identify.loads.loaded_robot import LETTERS, LoadedRobot
 from idbench.identify.loads.payload import WAYS, PayloadEstimate, with_known_robot
-from idbench.sim.robot.robot import Robot
 from idbench.sim.scenario.scenario_file import load as load_scenario
 
 GAIN_STEP = 1e-3
@@ -150,14 +148,6 @@ def simulated_pairs(asked: LoadRequest) -> Pairs:
     if asked.robot is not None:
         scenario = replace(scenario, robot=absolute(asked.robot))
     return Pairs(scenario, RUNS if asked.runs is None else asked.runs, asked.parameters)
-
-
-def files_of(asked: LoadRequest) -> tuple[Path, ...]:
-    """Return the files that are read, which nothing may be written over."""
-    robot = [] if asked.robot is None else [Robot.path(asked.robot)]
-    logs = [file_of(path) for path in (*asked.log, *asked.unloaded)]
-    before = getattr(asked, "before", None)
-    return (*robot, *logs, *([before] if before else ()))
 
 
 def _loaded(asked: LoadRequest) -> tuple[LoadJudgement, tuple[str, ...]]:

@@ -57,7 +57,7 @@ class IdentifyRequest(LogRequest):
     """Held-out logs on which the result is validated. Default: the last quarter of the log, predicted by a fit of the rest."""
     label: str = ""
     """Name of this identification in a recording. Default: chain and estimator."""
-    no_trials: bool = False
+    no_trials: Annotated[bool, Word(flag=True)] = False
     """Try no other options on held-out data where the result is not good."""
 
 
@@ -217,7 +217,7 @@ class RunRequest:
 class StudyRequest:
     """Simulate a scenario over a grid and many seeds, and identify each run."""
 
-    study: Annotated[str | None, Word("STUDY", positional=True, file=True)] = None
+    study: Annotated[str | None, Word("STUDY", positional=True, file="name")] = None
     """Name of a shipped study, or its file (TOML)."""
     resume: Folder = None
     """Folder of an interrupted study: run what is missing, and make the report again."""

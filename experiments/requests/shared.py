@@ -115,8 +115,8 @@ class LogRequest:
     """Which parameters are identified."""
     mask_speed: Each = ()
     """Speed below which a joint counts as resting or reversing, for all joints or for each [rad/s, m/s]; such instants are
-    masked. Default: 5 % of its rms speed or 4 times the noise of its velocity, raised up to 20 % where its friction differs
-    significantly from that of faster motion."""
+    masked. Default: 5 % of its rms speed or 4 times the noise of its velocity, and 2 or 4 times that where stretches left out
+    are then predicted better."""
     cutoff: Hertz = None
     """Cut-off of the low-pass [Hz]. Default: 5, or what a short log needs."""
     estimator: str = ESTIMATOR

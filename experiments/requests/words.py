@@ -19,20 +19,21 @@ class Word:
     """Whether it is switched on alone, never off."""
     short: str = ""
     """Another name of its option, such as -v."""
-    file: bool = False
-    """Whether it names a file: what a file names is looked for beside that file."""
+    file: Literal["", "file", "log", "robot", "name"] = ""
+    """Which kind of file it names (a log, or the folder of a run; a robot that ships, or its file; the name of what ships, or a
+    file), if it does: what a file names is looked for beside that file."""
 
 
-File = Annotated[Path | None, Word("FILE", file=True)]
+File = Annotated[Path | None, Word("FILE", file="file")]
 Folder = Annotated[Path | None, Word("DIR")]
 Hertz = Annotated[float | None, Word("HZ")]
 Seconds = Annotated[float | None, Word("SECONDS")]
 Real = Annotated[float | None, Word("FLOAT")]
 Count = Annotated[int | None, Word("N")]
-Robot = Annotated[str | None, Word("NAME|FILE", file=True)]
-ThisRobot = Annotated[str, Word(positional=True, file=True)]
-Scenario = Annotated[str | None, Word("SCENARIO", file=True)]
-ThisScenario = Annotated[str | None, Word("SCENARIO", positional=True, file=True)]
+Robot = Annotated[str | None, Word("NAME|FILE", file="robot")]
+ThisRobot = Annotated[str, Word(positional=True, file="robot")]
+Scenario = Annotated[str | None, Word("SCENARIO", file="name")]
+ThisScenario = Annotated[str | None, Word("SCENARIO", positional=True, file="name")]
 Url = Annotated[str | None, Word("URL")]
 Delay = Annotated[str | None, Word("SECONDS|estimate|joints")]
 Percent = Annotated[str | None, Word("PERCENT")]
@@ -41,14 +42,14 @@ Torque = Annotated[Meaning | None, Word("held|instantaneous|averaged")]
 Start = Literal["least-squares", "file"]
 """Where estimators begin that simulate or filter: at the least-squares estimate, or at the parameters of the robot's file."""
 Way = Literal["all", "together", "fixed", "apart", "difference"]
-Logs = Annotated[tuple[Path, ...], Word(positional=True, file=True)]
-Log = Annotated[Path, Word(positional=True, file=True)]
-Files = Annotated[tuple[Path, ...], Word("FILE", file=True)]
+Logs = Annotated[tuple[Path, ...], Word(positional=True, file="log")]
+Log = Annotated[Path, Word(positional=True, file="log")]
+Files = Annotated[tuple[Path, ...], Word("FILE", file="log")]
 Each = Annotated[tuple[float, ...], Word("FLOAT")]
 Window = Annotated[tuple[float, float] | None, Word("FROM TO")]
 Vector = Annotated[tuple[float, float, float] | None, Word("X Y Z")]
 Six = Annotated[tuple[float, float, float, float, float, float] | None, Word("XX YY ZZ XY XZ YZ")]
-Scenarios = Annotated[tuple[str, ...], Word("SCENARIO", file=True)]
+Scenarios = Annotated[tuple[str, ...], Word("SCENARIO", file="name")]
 Texts = Annotated[tuple[str, ...], Word("NAME=VALUE")]
 Weights = Annotated[tuple[str, ...], Word("NAME=WEIGHT")]
 Names = Annotated[tuple[str, ...], Word("NAME")]

@@ -185,12 +185,6 @@ def held_of(asked: ServoRequest, joints: Sequence[str]) -> dict[str, dict[str, f
     }
 
 
-def files_of(asked: ServoRequest) -> tuple[Path, ...]:
-    """Return the files that are read, which nothing may be written over."""
-    robot = [] if asked.robot is None else [Robot.path(asked.robot)]
-    return (*robot, *([asked.servo] if asked.servo else []), *asked.log, *asked.validate)
-
-
 def _read(
     path: Path, asked: ServoRequest, joints: Sequence[str], loops: Mapping[str, PositionLoop]
 ) -> tuple[ServoColumns, str]:

@@ -54,12 +54,6 @@ def run_of(asked: RunRequest, tell: Callable[[str], None]) -> ScenarioRun:
     return ScenarioRun(scenario, request)
 
 
-def files_of(asked: RunRequest) -> tuple[Path, ...]:
-    """Return the files that are read, which nothing may be written over."""
-    named = [asked.scenario, asked.robot]
-    return tuple(Path(name).absolute() for name in named if name is not None and Path(name).suffix)
-
-
 def _with_robot(tell: Callable[[str], None], scenario: Scenario, robot: str | None) -> Scenario:
     """Return a scenario with another robot, and moves that fit it."""
     if robot is None:

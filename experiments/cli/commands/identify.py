@@ -16,7 +16,6 @@ from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.fit import Fit
 from idbench.experiments.identification.job import (
     assumes_the_robot,
-    files_of,
     fit_of,
     loaded_logs,
     notes_of,
@@ -25,9 +24,10 @@ from idbench.experiments.identification.job import (
     summary_of,
 )
 from idbench.experiments.identification.logs import delay_method
-from idbench.experiments.identification.reading import DELAY_FOUND
+from idbench.experiments.identification.reading import DELAY_FOUND, file_of
 from idbench.experiments.identification.request import Request
 from idbench.experiments.identification.robot_model import SCARA
+from idbench.experiments.inputs import files_of
 from idbench.experiments.judgement.judgement import Judgement, judge
 from idbench.experiments.judgement.remedies import checks
 from idbench.experiments.recording.audience import Audience
@@ -53,7 +53,7 @@ def identify(options: Identify) -> None:
     """Identify logs, judge the result, save and show it."""
     page, request = new_page(machine=options.json), request_of(with_own_parts(options))
     command, read = command_of("identify", options, "log", NOT_MADE_AGAIN), files_of(options)
-    whole = command_of("identify", options, "log", LEFT_OUT, absolute=True)
+    whole, log = command_of("identify", options, "log", LEFT_OUT, absolute=True), file_of(options.log[0]).absolute()
     folder = ResultsFolder(options.out, "identify", whole, options.force, read) if options.out else None
     require_targets(options, request.robot_model, folder, read)
     require_layer(options, request.label, command)
@@ -65,7 +65,7 @@ def identify(options: Identify) -> None:
         with stages_of("identifying"):
             result = fit_of(*loaded_logs(with_own_parts(options), request))
         whole_models = models_in_full(result, options.model is not None)
-        page.found |= {"experiment": "identify", "log": read[0].name, "path": str(read[0]), **summary_of(result)}
+        page.found |= {"experiment": "identify", "log": log.name, "path": str(log), **summary_of(result)}
         kept = f"the estimates are printed{f', and with the logs in {folder.out}' if folder else ''}"
         with Attempts(kept, folder) as attempts:
             try:
@@ -86,8 +86,8 @@ def identify(options: Identify) -> None:
             for one in judgement.on:
                 print_held_out(page, one, whole_models, verbose=options.verbose)
             page.found |= judgement.summary()
-            for log in judgement.failures:
-                attempts.failed(log.title, log.why, log.traceback)
+            for one in judgement.failures:
+                attempts.failed(one.title, one.why, one.traceback)
             page.warn(warnings)
             attempts.attempt("summary.json", lambda: _save(folder, page))
             page.end()

@@ -12,7 +12,8 @@ from idbench.experiments.cli.options.jobs import IdentifyGains, IdentifyPayload
 from idbench.experiments.cli.saving import save_summary
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.robot_model import RobotModel
-from idbench.experiments.loads.job import GainsFit, PayloadFit, files_of, gains_of, payload_of, simulated_pairs
+from idbench.experiments.inputs import files_of
+from idbench.experiments.loads.job import GainsFit, PayloadFit, gains_of, payload_of, simulated_pairs
 from idbench.experiments.loads.known_load import LoadJudgement, negative_mass
 from idbench.experiments.loads.loads_text import (
     body_of,

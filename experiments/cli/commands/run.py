@@ -14,6 +14,7 @@ from idbench.experiments.cli.saving import Files, saved, write_scenario
 from idbench.experiments.identification.log_warnings import warnings_of_log
 from idbench.experiments.identification.robot_model import SCARA
 from idbench.experiments.identification.scenario_run import ScenarioRun
+from idbench.experiments.inputs import files_of
 from idbench.experiments.judgement.warnings import FILE, LOG, warnings_of_robot
 from idbench.experiments.plugin_tables import plugin_conflicts
 from idbench.experiments.program import program
@@ -21,7 +22,7 @@ from idbench.experiments.reports.estimates import models_in_full
 from idbench.experiments.reports.printed import print_fit
 from idbench.experiments.results.folder import ResultsFolder
 from idbench.experiments.results.page import Page, new_page, shown, stages_of
-from idbench.experiments.study.one_run import files_of, run_of
+from idbench.experiments.study.one_run import run_of
 from idbench.identify.files.log_file import write_log
 from idbench.sim.drives import ServoDrive
 from idbench.sim.scenario.scenario import Scenario

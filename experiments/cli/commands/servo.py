@@ -12,13 +12,14 @@ from idbench.experiments.cli.options.jobs import IdentifyServo
 from idbench.experiments.cli.saving import save_summary
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.robot_model import absolute
+from idbench.experiments.inputs import files_of
 from idbench.experiments.recording.audience import Audience
 from idbench.experiments.results.attempts import Attempts
 from idbench.experiments.results.folder import ResultsFolder
 from idbench.experiments.results.page import NOT_SAVED, Page, new_page, shown, stages_of
 from idbench.experiments.results.writing import require_free, write_text
 from idbench.experiments.servo.identification import Servos
-from idbench.experiments.servo.job import ServosFit, files_of, servos_identified
+from idbench.experiments.servo.job import ServosFit, servos_identified
 from idbench.experiments.servo.joints import Identified
 from idbench.experiments.servo.servo_files import (
     for_mujoco,

@@ -1,0 +1,25 @@
+"""The files that a request names."""
+
+from pathlib import Path
+from typing import Any
+
+from idbench.experiments.identification.reading import file_of
+from idbench.experiments.requests import jobs
+from idbench.experiments.requests.table import request_keys
+from idbench.experiments.requests.words import Word
+from idbench.sim.robot.robot import Robot
+
+
+def files_of(asked: Any) -> tuple[Path, ...]:
+    """The files that are read, by the marks of the request: nothing may be written over them."""
+    found = dict[Path, None]()
+    for place, hint in request_keys(next(kind for kind in type(asked).__mro__ if kind.__module__ == jobs.__name__)).values():
+        what = next((mark.file for mark in getattr(hint, "__metadata__", ()) if isinstance(mark, Word)), "")
+        value = asked
+        for name in place:
+            value = getattr(value, name)
+        for each in value if isinstance(value, tuple) else (value,):
+            if what and each and (what != "name" or Path(each).suffix):
+                path = Robot.path(each) if what == "robot" else file_of(each) if what == "log" else Path(each)
+                found[path.absolute()] = None
+    return tuple(found)
