@@ -1,17 +1,15 @@
 """The files that an identification can be written to, and their table."""
 
-import re
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
-from importlib.metadata import version
+from dataclasses import dataclass
 from pathlib import Path
 
-from idbench.experiments.exports import robots
 from idbench.experiments.exports.base_parameters import interval_of, json_text
 from idbench.experiments.exports.c_code import c_texts
 from idbench.experiments.exports.code import Content
 from idbench.experiments.exports.functions import require_formulas
 from idbench.experiments.exports.python_code import python_text
+from idbench.experiments.exports.robots import Exported, actuators, mjcf, origin, sdf, urdf
 from idbench.experiments.identification.consistent_robot import WrittenRobot
 from idbench.experiments.identification.fit import Fit
 from idbench.experiments.identification.robot_model import RobotModel
@@ -19,18 +17,6 @@ from idbench.experiments.results.writing import require_free, require_free_folde
 from idbench.sim.robot.rewrite import rewritten
 
 FOLDER = ".ensemble"  # Ending of the name of a folder with robots
-
-
-@dataclass(frozen=True)
-class Exported:
-    """What is written, and what is to be known of it."""
-
-    texts: dict[Path, str]
-    """Texts of the files: of that which was asked for, and of those that belong to it."""
-    warnings: list[str] = field(default_factory=list)
-    """What the files cannot hold, or what is wrong about them."""
-    notes: list[str] = field(default_factory=list)
-    """What else is to be said of them."""
 
 
 @dataclass(frozen=True)
@@ -58,30 +44,6 @@ class FileKind:
         """Yield all files that are written."""
         yield path
         yield from (path.with_name(path.stem + ending) for ending in self.beside)
-
-
-def mjcf(fit: Fit, model: str, path: Path) -> Exported:
-    """Return the robot's file with the parameters, made physically consistent."""
-    written = WrittenRobot(fit, model)
-    return Exported({path: _marked(written.text(path.absolute().parent), fit, model)}, written.warnings)
-
-
-def urdf(fit: Fit, model: str, path: Path) -> Exported:
-    """Return the robot as URDF with the parameters."""
-    text, warnings = robots.urdf(WrittenRobot(fit, model))
-    return Exported({path: _marked(text, fit, model)}, warnings)
-
-
-def sdf(fit: Fit, model: str, path: Path) -> Exported:
-    """Return the robot as SDF with the parameters."""
-    text, warnings = robots.sdf(WrittenRobot(fit, model))
-    return Exported({path: _marked(text, fit, model)}, warnings)
-
-
-def actuators(fit: Fit, model: str, path: Path) -> Exported:
-    """Return the values of the joints' actuators."""
-    text, warnings = robots.actuators(fit, model)
-    return Exported({path: text}, warnings)
 
 
 def base_parameters(fit: Fit, model: str, path: Path) -> Exported:
@@ -120,21 +82,8 @@ def _content(fit: Fit, model: str, path: Path) -> Content:
     estimate = fit.estimates[model]
     functions = require_formulas(estimate.problem.basis, fit.robot_model.tree, path)
     return Content(
-        functions, estimate.X.tolist(), estimate.standard_errors.tolist(), interval_of(fit, model), _origin(fit, model)
+        functions, estimate.X.tolist(), estimate.standard_errors.tolist(), interval_of(fit, model), origin(fit, model)
     )
-
-
-def _origin(fit: Fit, model: str) -> str:
-    logs = ", ".join(fit.logs.names) or "a log"
-    return f"identified from {logs} by {fit.request.estimator} of the {model} model, idbench {version('idbench')}"
-
-
-def _marked(text: str, fit: Fit, model: str) -> str:
-    """Return an XML file with a comment that says what it is from, below its declaration."""
-    declared = text.index("?>") + 2 if text.startswith("<?xml") else 0
-    before, after = text[:declared], text[declared:].lstrip("\n")
-    comment = f"<!-- {re.sub(r'-(?=-)', '- ', _origin(fit, model))} -->\n"  # two hyphens would end it
-    return f"{before}\n{comment}{after}" if before else comment + after
 
 
 def require_functions(robot_model: RobotModel, path: Path) -> None:
