@@ -93,7 +93,7 @@ def _marked(options: type, shown: Container[str] | None) -> type:
             help=texts.get(each.name),
             metavar=word.metavar or None,
             negative=None if plain is bool and not word.flag else (),
-            consume_multiple=True if several and not word.positional else None,
+            consume_multiple=(1, None) if several and not word.positional else None,
             show=visible,
             show_default=_default if each.default not in (None, (), "", MISSING, False) else False,
             show_choices=get_origin(plain) is Literal,
