@@ -271,7 +271,7 @@ class Estimate:
 
 
 def _real_array(name: str, values: npt.ArrayLike, shape: tuple[int, ...]) -> Array:
-    """Return what an estimator gives as an array; raise PluginError if that are no real numbers, or not as many."""
+    """An estimator's result as an array; raise PluginError if it has no real numbers, or not as many."""
     given = np.asarray(values)
     if given.dtype.kind not in "fiub" or given.shape != shape:
         raise PluginError(

@@ -199,7 +199,7 @@ def pieces(chain: Chain, logs: Sequence[MotionLog]) -> list[Piece]:
 
 
 def bias_counts(parts: Sequence[LogRows], names: tuple[str, ...], share: float) -> bool:
-    """Return whether what noise adds to W moves the estimate of all rows, of which `parts` are a share, by over `MOVED`."""
+    """True if the errors-in-variables bias exceeds `MOVED` sigma of all rows, of which `parts` are a share."""
     plain, better = (
         Factor(triangular(np.concatenate(rows)), np.array(0), names)
         for rows in (

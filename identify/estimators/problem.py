@@ -28,7 +28,7 @@ ROUNDING = 1e-9  # Share by which frequencies may differ that are the same: of a
 
 
 def same_form(one: MotionLog, other: MotionLog) -> bool:
-    """Return whether two logs have the same samples, joints and, but for rounding, frequency."""
+    """True if two logs have the same samples, joints and, but for rounding, frequency."""
     return one.q.shape[-2:] == other.q.shape[-2:] and abs(one.fs / other.fs - 1) < ROUNDING
 
 
@@ -303,7 +303,7 @@ class Problem:
         return pieces(self.own_chain, self.logs)
 
     def _of_pieces(self, reduced: Callable[[LogRows], Reduced]) -> list[Reduced]:
-        """Return what is made of every piece of long logs; the plain factors of their rows are made in passing."""
+        """Reductions of every piece of long logs; the plain factors of their rows are made in passing."""
         plain, found = list[Factors](), list[Reduced]()
         for part in self.every_part():
             plain.append(part.rows.factors)

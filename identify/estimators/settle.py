@@ -185,7 +185,7 @@ def _scanned(rows: AdaptiveRows, basis: Basis, count: int) -> Basis:
 
 
 def _below(costs: Array) -> Array:
-    """Return how far the minimum of a parabola lies below each value of a grid that is less than its neighbours, shape (i,)."""
+    """Depth of the parabola's minimum below each value of a grid that is less than its neighbours, shape (i,)."""
     found, costs = np.zeros(len(costs)), np.where(np.isfinite(costs), costs, np.nan)
     before = costs[:-2]
     here = costs[1:-1]

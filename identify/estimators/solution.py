@@ -63,7 +63,7 @@ class OfWeightedRows(AbstractSolution):
         return [part.rows.joined * weight[..., None] for part, weight in zip(parts, self.weights(parts), strict=True)]
 
     def weights(self, parts: Sequence[LogRows]) -> list[Array]:
-        """Return what rows were multiplied by, shape (..., r)."""
+        """Weights of the rows, shape (..., r)."""
         of_kinds = [np.tile(self.weight, part.rows.maps[0].grid.count) for part in parts]
         scaled = self.scaled and not parts[0].problem.alike
         return [weight * part.weights if scaled else weight for part, weight in zip(parts, of_kinds, strict=True)]
@@ -114,7 +114,7 @@ class Given(AbstractSolution):
 
 
 def _ends(parts: Sequence[LogRows]) -> Array:
-    """Return where the rows of each part but the last end among those of all."""
+    """Ends of the rows of each part but the last."""
     return np.cumsum([len(part.rows.time) for part in parts])[:-1]
 
 

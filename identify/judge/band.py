@@ -46,7 +46,7 @@ class Band:
         return cls(cutoff, 2 * T * cutoff, wanted, content)
 
     def words(self, parameters: int, least: float) -> str:
-        """Return what was chosen, and why; nothing where the default serves."""
+        """The chosen band and its reason; nothing where the default serves."""
         if self.cutoff < least:
             return (
                 f"band up to {self.cutoff:.2g} Hz instead of {least:g}, since the log is sampled slowly (--cutoff says another)"
@@ -69,7 +69,7 @@ def content_end(log: MotionLog) -> float:
 
 
 def _end(f: Array, power: Array, floor: float) -> float:
-    """Return where a spectrum first falls to its floor, smoothed over three lines."""
+    """First frequency at which a spectrum, smoothed over three lines, is at its floor."""
     smooth = np.convolve(np.pad(power, 1, mode="edge"), np.ones(3) / 3, mode="valid")
     faint = np.flatnonzero(smooth[1:] <= ABOVE * floor)
     return float(f[1 + faint[0]]) if len(faint) else float(f[-1])

@@ -99,7 +99,7 @@ class _Motion:
         return cls(basis, qd, middle, M, D, K, W, friction_jumps(basis, X, np.reshape(q, (-1, basis.n))[0]), T)
 
     def steps(self, T: float | Array, some: Index = ()) -> tuple[Array, Array]:
-        """Return how errors of (q, qd) move over times T of some periods: A of themselves, B of a torque."""
+        """Transition matrices A of the error of (q, qd), and B of a torque, over times T of some periods."""
         M, D, K = (x[some] for x in (self.M, self.D, self.K))
         n, inverse = self.basis.n, np.linalg.inv(M)
         F = np.zeros((*M.shape[:-2], 2 * n, 2 * n))

@@ -53,7 +53,7 @@ class DelayEstimate:
         return float(np.max(self.sigma))
 
     def differs(self, channel: TorqueChannel, least: float) -> bool:
-        """Return whether it differs from the delays of a channel by more than `least` [s]."""
+        """True if it differs from the delays of a channel by more than `least` [s]."""
         found, stated = (one.delay + np.asarray(one.lags or 0.0) for one in (self, channel))
         return bool((np.abs(found - stated) > least).any())
 
@@ -210,7 +210,7 @@ def _with_scatter(problem: Problem, found: DelayEstimate) -> DelayEstimate:
 
 
 def _is_read(logs: Sequence[MotionLog], chain: Chain) -> bool:
-    """Return whether the chain reads the delay of a log at all."""
+    """True if the chain reads the delay of a log."""
     late = replace(logs[0], torque=replace(logs[0].torque, delay=1 / logs[0].fs))
     return not np.array_equal(chain.signals(late).torque.mean, chain.signals(logs[0]).torque.mean)
 

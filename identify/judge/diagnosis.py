@@ -28,7 +28,7 @@ SAMPLES = 20.0  # Samples for each period of the operator's cut-off with which l
 
 
 def diagnosed(problem: Problem, X: Array) -> tuple[Suspect, ...]:
-    """Return what is wrong: a mistake that is not small, or small ones, whatever makes the rows most likely.
+    """Mistakes that make the rows most likely: one that is not small, or several small ones.
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ def _with_fewer(log: MotionLog, every: int) -> MotionLog:
 
 
 def silent_joint(problem: Problem, X: Array) -> Suspect | None:
-    """Return that the torque of the first joint whose torque never changes though it moves was not logged.
+    """The missing torque of the first moving joint whose torque column is constant; None if there is none.
 
     A joint without a drive has none: inertia and weight balance in it, where parameters of one that has vanish.
 
@@ -155,7 +155,7 @@ def silent_joint(problem: Problem, X: Array) -> Suspect | None:
 
 
 def unlogged(j: int) -> Suspect:
-    """Return that the torque of a joint was not logged."""
+    """The mistake of a joint whose torque was not logged."""
     return Suspect("missing_torque", "torque", j, (1.0,), (0.0,), "1", 0.0, np.inf, (), (100.0, 0.0), np.inf)
 
 

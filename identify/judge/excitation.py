@@ -23,7 +23,7 @@ from idbench.identify.rows.factors import NOT_SHOWN
 
 
 def seen(held_out: MotionLog | LogColumns, fitted: Sequence[MotionLog | LogColumns]) -> int:
-    """Return how many samples of a log, in which a joint moves, are also in another: equal positions and torques.
+    """Number of moving samples of a log that are also in others: equal positions and torques.
 
     A robot that rests repeats its readings; noise of the torques tells other samples apart. Logs that were put on another clock
     do not have their samples any more: give the columns of their files. Torques with a clock of their own are not compared.
@@ -76,7 +76,7 @@ class NoiseInRows(NamedTuple):
 
 
 def noise_in_rows(estimate: Estimate) -> NoiseInRows:
-    """Return whether least squares has a bias that instrumental variables have not.
+    """Durbin-Wu-Hausman test of the bias of least squares against instrumental variables.
 
     The difference of both estimates is (G_IV - G_LS)' r, with r the noise of the rows, if that in W does not matter; its
     covariance then follows from that of the rows, whichever of both is the more efficient (J. A. Hausman, "Specification tests
@@ -140,7 +140,7 @@ def showing_moves(tree: KinematicTree, grouping: BaseParameters, names: Sequence
 
 
 def brisk_shares(tree: KinematicTree, basis: Basis, X: Array, sigma: Array) -> Array:
-    """Return how much of the torque of a brisk motion one sigma of each parameter makes, of the joint where it makes most.
+    """Share of a brisk motion's torque that one sigma of each parameter makes, at the joint where it is largest.
 
     The motion is one of random states at up to 5 rad/s and 25 rad/s^2: what a log leaves open shows there, if anywhere.
 

@@ -98,7 +98,7 @@ class FittedMotion:
         return np.asarray((self._of(*self.rigid, ahead) - self.load) / h) + self._friction_slope()
 
     def on(self, changed: Callable[[KinematicTree], KinematicTree]) -> Array | None:
-        """Return what the torque of a robot whose tree is changed by `SMALL` has more, over that; None if it has no tree."""
+        """Derivative of the torque by a change of the robot's tree, by a step of `SMALL`; None if it has no tree."""
         if self.tree is None:
             return None
         basis, X = self.rigid

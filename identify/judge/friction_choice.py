@@ -66,7 +66,7 @@ class LawSearch:
         return [(j, name) for name, j in self.products.places]
 
     def score(self, j: int, name: str) -> LawScore:
-        """Return what a law gains at a joint."""
+        """Gain of a law at a joint."""
         (before, left_open), (after, more_open) = self._errors(j, None), self._errors(j, name)
         if not np.isfinite(after).all():  # nothing that could be solved
             return LawScore(j, name, -np.inf, -np.inf, 0.0, -np.inf, -np.inf, taken=False)
@@ -230,7 +230,7 @@ class _Choice:
         return min(marks)[2] if marks else own
 
     def _spoils(self, search: LawSearch, before: Sequence[tuple[str, ...]], j: int) -> bool:
-        """Return whether friction of a joint falls at speeds beyond those of the logs, and did not with the laws before."""
+        """True if friction of a joint newly falls at speeds beyond those of the logs."""
         return falls(search.products.start, j) and not falls(self._search(before, {}).products.start, j)
 
     def _needed(self, laws: Sequence[tuple[str, ...]], j: int) -> tuple[str, ...]:
@@ -245,7 +245,7 @@ class _Choice:
         return own
 
     def _in_place(self, laws: Sequence[tuple[str, ...]], j: int) -> LawScore | None:
-        """Return what tanh gains in the place of Coulomb friction, if it predicts motion better that was not fitted.
+        """Gain of tanh over Coulomb friction on held-out motion, if there is any.
 
         Beside it, as laws are compared at first, the two share what they explain. Fast motion is not asked: there both are the
         same.
@@ -306,7 +306,7 @@ class _Choice:
 
 
 def falls(problem: Problem, j: int) -> bool:
-    """Return whether the identified friction of a joint is less at twice its highest speed in the logs, in either direction.
+    """True if the identified friction is less at twice the highest speed of the logs, in either direction.
 
     Laws that share what they explain, such as arctan and a negative viscous friction, do that; no drive does.
     """

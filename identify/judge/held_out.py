@@ -75,7 +75,7 @@ class HeldOutProducts:
         return float(fit.X[place] / np.sqrt(fit.factor.inverse(fit.factor.status == Status.OK)[place, place]))
 
     def sigmas(self, law: str, j: int) -> float:
-        """Return how many sigma the parameters of a law are away from zero, at the shapes that explain most."""
+        """Distance of a law's parameters from zero [sigma], at the shapes that explain most."""
         columns = [*range(self.p), *self.likely(law, j)[0]]
         X, C = solved(self._every, columns), _inverse(self._every, columns)
         return float((np.abs(X[self.p :]) / np.sqrt(np.maximum(np.diagonal(C)[self.p :], TINY))).max())

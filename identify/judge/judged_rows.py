@@ -95,7 +95,7 @@ def row_noise(left: Instants, signals: Signals, chain: Chain) -> Array:
 
 
 def _impulses(signals: Signals, chain: Chain) -> tuple[Array, Array]:
-    """Return what an impulse of the torque, and one of the position, leave in the torque's residual."""
+    """Impulse responses of the torque's residual to torque and to position."""
     log, fs = signals.log, signals.fs
     x = np.zeros(2 * int(np.ceil(chain.halo(fs, log.torque) * fs)) + 101)
     x[len(x) // 2] = 1.0

@@ -44,25 +44,25 @@ def whole_rows(x: Array | None) -> Rows:
 
 
 def position_zero(m: FittedMotion, j: int) -> Rows:
-    """Return what a position makes that is counted from elsewhere, by rad."""
+    """Torque per zero offset of a position [N m/rad]."""
     one, none = np.ones_like(m.t), np.zeros_like(m.t)
     return whole_rows(-m.moved(j, one, none, none))
 
 
 def position_scale(m: FittedMotion, j: int) -> Rows:
-    """Return what positions make that are too large, by their share."""
+    """Torque per relative scale error of a position [N m]."""
     state = m.state
     return whole_rows(-m.moved(j, state.q[j], state.qd[j], state.qdd[j]))
 
 
 def late_position(m: FittedMotion, j: int) -> Rows:
-    """Return what a late position makes, by s."""
+    """Torque per delay of a position [N m/s]."""
     qd, qdd = m.state.qd[j], m.state.qdd[j]
     return whole_rows(m.moved(j, qd, qdd, m.rate(qdd)))
 
 
 def eccentric(m: FittedMotion, j: int) -> tuple[Rows, ...]:
-    """Return what an encoder off its centre makes: sine and cosine of the position."""
+    """Torques of an eccentric encoder: position errors in sine and cosine of the position."""
     q, qd, qdd = (x[j] for x in (m.state.q, m.state.qd, m.state.qdd))
     sin, cos = np.sin(q), np.cos(q)
     return (
@@ -72,7 +72,7 @@ def eccentric(m: FittedMotion, j: int) -> tuple[Rows, ...]:
 
 
 def backlash(m: FittedMotion, j: int) -> Rows:
-    """Return what play makes of a position on the side of the motor, as teeth change sides with what they carry."""
+    """Torque per backlash, for an encoder at the motor [N m/rad]: teeth change sides with their load."""
     side = teeth(m, j)
     crossed = m.rate(side)
     return whole_rows(-m.moved(j, side, crossed, m.rate(crossed)))
@@ -84,7 +84,7 @@ def teeth(m: FittedMotion, j: int) -> Array:
 
 
 def elasticity(m: FittedMotion, j: int) -> Rows:
-    """Return what compliance makes of a position on the side of the motor."""
+    """Torque per compliance of the gear, for an encoder at the motor."""
     first, second = m.rates
     return whole_rows(-m.moved(j, m.load[j], first[j], second[j]))
 
@@ -95,7 +95,7 @@ def cogging(waves: int) -> Columns:
 
 
 def presliding(m: FittedMotion, j: int, share: float) -> Array:
-    """Return what friction lacks while it turns: z - sign(qd), dz/d|q| = (sign(qd) - z) / distance (Dahl)."""
+    """Presliding deficit of Coulomb friction: z - sign(qd), dz/d|q| = (sign(qd) - z) / distance (Dahl)."""
     q, side = m.state.q[j], np.sign(m.state.qd[j])
     way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(q)))]) / max(share * float(np.std(q)), 1e-12)
     turns = np.flatnonzero(np.diff(side)) + 1
@@ -108,17 +108,17 @@ def presliding(m: FittedMotion, j: int, share: float) -> Array:
 
 
 def turning(share: float) -> Signal:
-    """Return what friction lacks while it turns, over a share of the rms of positions."""
+    """Presliding deficit of friction over a share of the rms position."""
     return lambda m, j: presliding(m, j, share)
 
 
 def coupled(m: FittedMotion, j: int) -> Rows:
-    """Return what a rotor of joint j + 1 that is turned by joint j, too, makes of both."""
+    """Torques of the rotor of joint j + 1 that joint j turns, too."""
     return {j: m.state.qdd[j + 1], j + 1: m.state.qdd[j]} if j + 1 < m.n else {}
 
 
 def tilt(m: FittedMotion, j: int) -> tuple[Rows, ...]:
-    """Return what gravity makes that is turned about the axes across it."""
+    """Gravity torques per tilt about the two axes across gravity."""
     del j
     if m.tree is None or not np.any(m.tree.gravity):
         return ()
@@ -145,7 +145,7 @@ def link_length(axis: int) -> Columns:
 
 
 def link_axis(m: FittedMotion, j: int) -> tuple[Rows, ...]:
-    """Return what an axis has that is turned about two directions across it."""
+    """Torques per misalignment of an axis about two directions across it."""
     if m.tree is None or not j:  # the first is a tilt of the base
         return ()
     across = np.linalg.svd(m.tree.joints[j].axis[None])[2][1:]
@@ -167,7 +167,7 @@ def rotation(v: Array) -> Array:
 
 
 def fading(share: float) -> Signal:
-    """Return what friction has more near rest, up to a share of the joint's rms speed."""
+    """Additional friction near rest, up to a share of the joint's rms speed."""
 
     def signal(m: FittedMotion, j: int) -> Array:
         qd = m.state.qd[j]
@@ -203,7 +203,7 @@ def of_every(f: Signal, scale: Callable[[FittedMotion, int], float] = alike) -> 
 
 
 def asymmetric(m: FittedMotion, j: int) -> tuple[Rows, ...]:
-    """Return what the frictions of all joints are more in one direction than in the other: |qd|, and a constant."""
+    """Direction-dependent friction of all joints: |qd|, and a constant."""
     del j
     size = [friction(m, k) for k in range(m.n)]
     speed = [np.abs(qd) / rms(qd) for qd in m.state.qd]
@@ -211,12 +211,12 @@ def asymmetric(m: FittedMotion, j: int) -> tuple[Rows, ...]:
 
 
 def late(m: FittedMotion, j: int) -> Array:
-    """Return what a late torque lacks, by s."""
+    """Torque error per delay [N m/s]."""
     return -m.rate(m.torque[j])
 
 
 def pushed(axis: int) -> Columns:
-    """Return what an acceleration of the base along an axis makes of the torques."""
+    """Torques per acceleration of the base along an axis."""
 
     def column(m: FittedMotion, j: int) -> Rows:
         del j
@@ -226,7 +226,7 @@ def pushed(axis: int) -> Columns:
 
 
 def payload(m: FittedMotion, j: int) -> tuple[Rows, ...]:
-    """Return what a mass, and its first moments, make of the torques at the last link."""
+    """Torques per mass and first moments at the last link."""
     del j
     if m.tree is None:
         return ()

@@ -100,7 +100,7 @@ class Instants:
 
 
 def instants(signals: Signals, basis: Basis, model: AbstractModel, chain: Chain, X: Array) -> Instants:
-    """Return what `model` with the parameters `X` leaves unexplained at every sample of one log.
+    """Residual of `model` with the parameters `X` at every sample of one log.
 
     Raises
     ------

@@ -130,7 +130,7 @@ class _Search:
                 yield one, (float(before[j]), float(after[j]))
 
     def _pushes(self, one: _Tested, before: float) -> bool:
-        """Return whether a push is large beside the torque of its joint: what happens once cannot be predicted."""
+        """True if a push is large beside the torque of its joint; what happens once cannot be predicted."""
         rows = self.problem.rows
         level = float(np.sqrt(np.mean(rows.Y[(rows.group == one.candidate.joint) & rows.valid] ** 2)))
         return before > MATTERS and bool(np.abs(one.size).max() > PUSHED * level)
@@ -190,13 +190,13 @@ class _Search:
         return self._unlikely(e) - self._unlikely(e - U @ b) - len(b) * np.log(len(e))
 
     def _may_matter(self, e: Array, b: Array) -> bool:
-        """Return whether a mistake could be sure: residuals that are correlated scatter its size by more than white ones."""
+        """True if a mistake may be significant: correlated residuals scatter its size more than white ones."""
         rows = self.problem.rows
         least = float(np.min(np.sum(rows.by_kind(e * rows.valid) ** 2, axis=-1) / np.maximum(rows.count, 1)))
         return self._by_chance(len(b), float(b @ b) / max(least, TINY)) < CERTAIN
 
     def _torque_gain(self, j: int) -> float:
-        """Return how much too large torques of a joint are: 1 + g(k+1) = (1 + g(k)) (1 + b), b that of Y_j / (1 + g(k))."""
+        """Gain error of a joint's torque: 1 + g(k+1) = (1 + g(k)) (1 + b), b that of Y_j / (1 + g(k))."""
         rows, gain = self.problem.rows, 1.0
         held = np.concatenate([held_torque(part) for part in self.problem.parts])
         Q, R = np.linalg.qr(self._W)
@@ -210,7 +210,7 @@ class _Search:
         return gain - 1
 
     def _white(self, x: Array) -> Array:
-        """Return what plain rows have, made independent, with zeros for what is known before."""
+        """Whitened rows, with zeros for the prior."""
         each = zip(self.problem.parts, self._split(x), strict=True)
         return np.concatenate([*(part.whitening.whiten(y[:, None])[:, 0] for part, y in each), np.zeros(self._known)])
 

@@ -87,7 +87,7 @@ class Validation:
 
 
 def validate(held_out: Problem, X: Array, covariance: Array | None = None, noise: Array | None = None) -> Validation:
-    """Return how well the parameters `X`, with their `covariance`, predict the torques of a log, by the explicit model.
+    """Torque errors of the explicit model with parameters `X` and their `covariance` on a log.
 
     Both sides go through the same chain. Where a joint reverses or rests is judged apart, also where the chain masks nothing:
     figures of fits with and without friction are comparable. A joint that never moves counts then, all the time.
@@ -150,7 +150,7 @@ def split(log: MotionLog, share: float = HELD_OUT) -> tuple[MotionLog, MotionLog
 
 
 def _bound(operator: AbstractOperator, fs: float) -> float:
-    """Return what the correlation of rows that an operator makes of white noise stays below, times the root of their number.
+    """95 % bound of the autocorrelation of filtered white noise, times sqrt(N).
 
     It is the largest of LAGS - 1 normal ones, whose variance is the sum of squares of the rows' own correlations (Bartlett).
     """

@@ -152,5 +152,5 @@ def _between(x: Array, places: Array, every: int) -> Array:
 
 @lru_cache(maxsize=16)
 def _parabola(window: int) -> Array:
-    """Return what samples count for in the middle of the parabola through them (Savitzky and Golay)."""
+    """Weights of the samples at the middle of their least-squares parabola (Savitzky and Golay)."""
     return frozen(parabola(window))

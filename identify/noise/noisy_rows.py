@@ -65,7 +65,7 @@ class NoisyRows:
         return None if to_rows is self.to_rows else NoisyRows(to_rows, self.linear)
 
     def whitening(self, levels: NoiseLevels) -> Whitening:
-        """Return what makes the rows that are kept independent, by noise of these levels; of `units` where they are there."""
+        """Whitening of the kept rows by noise of these levels; of `units` where they are there."""
         if "units" in self.__dict__:
             position = np.broadcast_to(levels.effective_position, levels.torque.shape)
             squares = np.concatenate([levels.in_rows, position], axis=-1) ** 2
@@ -73,7 +73,7 @@ class NoisyRows:
         return self.whitening_by([self.covariance(levels)], np.ones(1))
 
     def whitening_by(self, parts: Sequence[BandedCovariance], shares: Array) -> Whitening:
-        """Return what makes the rows that are kept independent, by so much of each covariance, shape (..., part)."""
+        """Whitening of the kept rows by shares of each covariance, shape (..., part)."""
         return Whitening(BandMatrix.weighted(self.matrices(parts), shares), self.kept)
 
     @cached_property

@@ -85,7 +85,7 @@ class Paths:
 
 
 def torque_paths(rows: RowMap) -> Paths:
-    """Return how noise of the torques reaches rows.
+    """Paths of torque noise to the rows.
 
     A row weighs the torques by its response times w B. Prefilter and alignment act on the response, as if w and B were constant
     over the little that they look at.
@@ -101,7 +101,7 @@ def torque_paths(rows: RowMap) -> Paths:
 
 
 def position_paths(rows: RowMap, linear: Linearization) -> Paths:
-    """Return how noise of the positions reaches rows.
+    """Paths of position noise to the rows.
 
     The rows of every model are, to first order, those of B times the explicit model's error, so that one linearization serves
     all. A row of response h sums h w B (M s^2 + D s + K) n over time, M, D and K being inertia, damping and stiffness. By parts
@@ -174,7 +174,7 @@ def _without_tails(windows: Sequence[Array], first: int) -> list[Array]:
 
 
 def _tail(window: Array) -> int:
-    """Return how many samples have next to no energy before the rest of a window."""
+    """Number of leading samples of a window with next to no energy."""
     energy = np.cumsum(window**2)
     return int(np.searchsorted(energy, TAIL * energy[-1]))
 

@@ -146,7 +146,7 @@ class _Slope:
         return np.divide(self.found, self.expected, out=np.ones_like(self.found), where=self.expected > 0)
 
     def newton(self, squares: Array, least: Array) -> Array:
-        """Return what squares are multiplied by in a step by average information; those that would go below `least` stay."""
+        """Factors of the squares in a step by average information; those that would go below `least` stay."""
         held = (squares <= least) & (self.found <= self.expected)
         free = ~held & np.isfinite(self.found) & (self.expected > 0)
         both = free[..., :, None] & free[..., None, :]
@@ -159,7 +159,7 @@ class _Slope:
         return np.clip(1 + step, 1 / FARTHEST, FARTHEST)
 
     def small(self, squares: Array, moved: Array) -> npt.NDArray[np.bool_]:
-        """Return whether a change of the squares moves neither X, nor sigma, by anything that counts, shape (...)."""
+        """True where a change of the squares moves neither X nor sigma significantly, shape (...)."""
         weight = np.maximum(np.nan_to_num(self.expected * squares), 0.0)
         total = np.sum(weight, axis=-1, keepdims=True)
         share = np.divide(weight, total, out=np.zeros_like(weight), where=total > 0)

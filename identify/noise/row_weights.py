@@ -97,7 +97,7 @@ MIN_RATIO, MAX_RATIO = 0.01, 10.0
 
 
 def friction_bias(to_rows: RowMap, linear: Linearization, model: AbstractModel, position: Array) -> Array:
-    """Return what noise of the velocities makes of W X where joints hardly move, shape (..., r).
+    """Bias of W X by noise of the velocities where joints hardly move, shape (..., r).
 
     Friction turns noise into power, Fs |qd|, of one sign: that of a velocity of E|qd + noise| - |qd|.
 

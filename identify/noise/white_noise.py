@@ -22,7 +22,7 @@ PRECISE = 1e-12  # Share of the mean square of the positions below which differe
 
 
 def repeats(logs: Sequence[MotionLog], sigma: Array) -> Array:
-    """Return how many times the variance of an average over the logs is what independent errors of the positions make it.
+    """Variance of an average over the logs, over that of independent position errors.
 
     A motion that is periodic in whole samples meets the same counts of an encoder again: of m periods the errors are those of
     one, and average out no more than these. With D(lag) the mean square of q(t + lag) - q(t), 2 sigma^2 where errors are

@@ -110,7 +110,7 @@ class BaseParameters:
         return {name: self.grouping(i) for i, name in enumerate(self.names)}
 
     def grouping(self, i: int) -> str:
-        """Return what base parameter `i` is made of, such as ZZ1 + Ia1 + 0.25 M2."""
+        """Grouping of base parameter `i`, such as ZZ1 + Ia1 + 0.25 M2."""
         places = [self.kept[i], *(int(k) for k in np.flatnonzero(self.K[i]) if k != self.kept[i])]
         text = ""
         for k in places:
@@ -160,7 +160,7 @@ def random_states(tree: KinematicTree, count: int) -> Array:
 
 
 def _grouped(W: Array) -> tuple[list[int], Array]:
-    """Return which columns stay, and what makes all of them of those."""
+    """Independent columns, and the matrix that makes all columns of them."""
     R: Array = np.linalg.qr(W, mode="r")  # type: ignore[assignment]  # mode "r" gives R alone
     kept = _independent(R)
     K: Array = np.asarray(np.linalg.lstsq(R[:, kept], R, rcond=None)[0], dtype=np.float64)
@@ -183,12 +183,12 @@ def _independent(R: Array) -> list[int]:
 
 
 def _count(tree: KinematicTree) -> int:
-    """Return how many random states group a robot's parameters; every state has a row for each joint."""
+    """Number of random states that group a robot's parameters; every state has a row for each joint."""
     return STATES * min(tree.n, ENOUGH)
 
 
 def _large(tree: KinematicTree, standard: Basis, length: Array) -> Array:
-    """Return how long a column of each parameter may be: the longest of its unit, that of a first moment against gravity."""
+    """Largest norm of a column of each parameter: the longest of its unit, that of a first moment against gravity."""
     units, kinds = np.array(standard.units), np.array([parameter.kind for parameter in standard.parameters])
     large = np.array([length[units == unit].max() for unit in units])
     weight = np.linalg.norm(tree.gravity) * np.sqrt(_count(tree))
@@ -221,7 +221,7 @@ def scara() -> Basis:
 
 
 def in_letters_of_the_paper(tree: KinematicTree) -> dict[Parameter, Parameter]:
-    """Return how the paper writes first moments of link 2 of a SCARA; nothing of another tree."""
+    """The paper's letters of the first moments of link 2 of a SCARA; nothing of another tree."""
     if tree.n != JOINTS:
         return {}
     length = float(np.linalg.norm(tree.joints[1].position))

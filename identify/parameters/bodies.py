@@ -38,7 +38,7 @@ def inertial(S: Array) -> Array:
 
 
 def exist(parameters: Sequence[Parameter], values: Array) -> bool:
-    """Return whether all links of a robot can exist, and no armature or friction is below zero."""
+    """True if all links of a robot are physically consistent, and no armature or friction is below zero."""
     links: dict[tuple[int | None, str], dict[str, float]] = {}
     for parameter, value in zip(parameters, values.tolist(), strict=True):
         if parameter.symbol in INERTIAL:
@@ -122,7 +122,7 @@ class Bodies:
         return thick
 
     def room(self, x: Array, step: Array) -> float:
-        """Return how many times a step can be made from x before it reaches bodies that do not exist."""
+        """Largest multiple of a step from x that stays physically consistent."""
         least = [float(np.min(step[self._signed] / x[self._signed], initial=0.0))]
         inner = np.linalg.inv(np.linalg.cholesky(pseudo_inertia(x[self._places])))
         changes = inner @ pseudo_inertia(step[self._places]) @ np.swapaxes(inner, 1, 2)

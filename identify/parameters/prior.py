@@ -29,7 +29,7 @@ class NormalPrior:
 
     @classmethod
     def of(cls, K: Array, values: Array, sigma: Array) -> "NormalPrior":
-        """Return what standard values with standard deviations, infinite where nothing is known, say of base parameters K x.
+        """Prior of base parameters K x from standard values with standard deviations, infinite where unknown.
 
         A base parameter of which a part is not known is not known at all.
 
@@ -73,7 +73,7 @@ class FilePrior:
     """Relative change of a link that is expected; the weight is its inverse square."""
 
     def rows(self, R: Array) -> Array:
-        """Return what is known, at the best links for R."""
+        """Prior rows at the best links for R."""
         links = np.array([p.kind in BODY for p in self.parameters])
         own = (self.K[:, links] != 0).any(axis=1) & ~(self.K[:, ~links] != 0).any(axis=1)
         K = self.K[np.ix_(own, links)]

@@ -142,7 +142,7 @@ def _centred(x: Array) -> Array:
 
 
 def initial_state(run: ServoRun) -> Begin:
-    """Return how a run begins, from its first samples; it is at rest if they differ by two counts at most."""
+    """Initial state of a run, from its first samples; at rest if they differ by two counts at most."""
     if run.step:
         t, q = run.t[:7] - run.t[0], run.clean[:7]
         at = float(np.median(q[:3]))

@@ -39,7 +39,7 @@ class Excitation:
 
     @classmethod
     def of(cls, runs: Sequence[ServoRun], held: Mapping[str, float]) -> Self:
-        """Return what runs can show, some parameters being known; raise IdentificationError if that is nothing."""
+        """Excitation of runs, given known parameters; raise IdentificationError if they show nothing."""
         if not runs:
             raise IdentificationError("there is no run of the servo")
         ranges = [float(np.ptp(run.clean)) for run in runs]

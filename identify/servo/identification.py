@@ -31,7 +31,7 @@ class OffsetJoint(NamedTuple):
 
 
 def per_offset(fit: ServoFit, runs: Sequence[ServoRun], other: Sequence[ServoRun]) -> Array:
-    """Return by how much the free parameters of a fit change per rad of another joint's offset, shape (p,).
+    """Derivative of the free parameters by another joint's position offset, shape (p,) [1/rad].
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ def _of(joint: OffsetJoint, k: int) -> Array:
 
 
 def _covariance(j: int, joints: Mapping[int, OffsetJoint], per_error: Array, own: Mapping[int, int]) -> Array:
-    """Return that of joint j, `per_error` being what an error of each offset does to its parameters, shape (p, source)."""
+    """Covariance of joint j; `per_error` is the derivative of its parameters by each offset, shape (p, source)."""
     more, all_of = np.eye(len(per_error)), np.zeros((len(per_error), len(per_error)))
     for column, (k, place) in zip(per_error.T, own.items(), strict=True):
         if k == j:

@@ -30,7 +30,7 @@ class LeftOut:
 
 
 def left_out(found: Found, loop: ServoLoop, c: float, parts: int) -> LeftOut:
-    """Return what a fit is without each cluster, and H^-1 S H^-1, the covariance that follows.
+    """Jackknife over clusters, and the sandwich covariance H^-1 S H^-1.
 
     H is the curvature of the objective, S the covariance of its gradient (P. J. Huber, 1967), both those that are left when
     every change of the parameters comes with the best beginnings of the runs. S adds up over runs, or pieces of them, each with

@@ -39,7 +39,7 @@ def simpler(law: str) -> list[str]:
 
 
 def start_parameters(law: str, p: Mapping[str, float], speed: float) -> dict[str, float]:
-    """Return where the parameters of a law begin, with those of the simpler law and a typical speed [rad/s]."""
+    """Initial parameters of a law, from those of the simpler law and a typical speed [rad/s]."""
     load = p.get("Fl", 0.1)
     first = {"Fst": 0.3 * p["Fs"], "vs": 0.1 * speed, "Fl": 0.05, "Fls": 0.3 * load, "Fle": load, "Flm": load, "Flq": 0.0}
     first |= {"Fgd": 0.1, "Fgb": 0.05}
@@ -122,7 +122,7 @@ def parameters_of(friction: str, more: Sequence[str] = ()) -> tuple[str, ...]:
 
 
 def step_of(name: str, value: float, scales: dict[str, float]) -> float:
-    """Return by how much differences change a parameter."""
+    """Step of finite differences of a parameter."""
     parameter = SERVO_PARAMETERS[name]
     return parameter.relative * abs(value) if parameter.relative else parameter.share * scales[parameter.of]
 

@@ -90,7 +90,7 @@ BESIDE = 5  # Samples whose median a position is compared with
 
 
 def well_read(q: Array) -> npt.NDArray[np.bool_]:
-    """Return whether each position of a joint [rad], shape (time,), is no spike."""
+    """True for positions of a joint [rad], shape (time,), that are no spikes."""
     typical = median_filter(q, BESIDE, mode="nearest")
     moves = np.abs(np.diff(q))
     longest = max(np.abs(np.diff(typical)).max(), moves[moves > 0].min(initial=np.inf) if moves.any() else 0.0)
@@ -236,7 +236,7 @@ def pieces(run: ServoRun, delay: float) -> list[ServoRun]:
 
 
 def _may_begin(run: ServoRun, k: int, step: float) -> bool:
-    """Return whether a motion before sample k, of which nobody knows how it began, is short, and others follow."""
+    """True if the initial transient before sample k may be dropped: it is short, and other motion follows."""
     t = run.t
     long = len(t) - k >= MIN_SAMPLES and t[-1] - t[k] >= SHORTEST
     return bool(t[k] - t[0] < SHORTEST and long and run.enabled[:k].all() and np.ptp(run.clean[k:]) > MOVES * step)

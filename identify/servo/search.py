@@ -228,5 +228,5 @@ class _Normal:
         self.inverse = np.linalg.pinv(self.A, 1e-6, hermitian=True)
 
     def begin(self, steps: Array) -> Array:
-        """Return how far beginnings move with steps of the parameters, shape (lane, parameter), as (lane, run, 3)."""
+        """Changes of the initial states with steps of the parameters, shape (lane, parameter), as (lane, run, 3)."""
         return np.asarray(self._pull - np.einsum("lp,rkp->lrk", steps, self._follow))

@@ -62,13 +62,13 @@ class Valleys:
         return found
 
     def near(self, p: Mapping[str, float], free: Sequence[str], rounds: int) -> Found:
-        """Return what a search finds from a place in coarse steps, without leaving its valley."""
+        """Best parameters near a start, in coarse steps within its valley."""
         return self._search(self._coarse, p, free).best(p, rounds)
 
     def refined(
         self, loop: ServoLoop, p: Mapping[str, float], free: Sequence[str], many: bool
     ) -> tuple[Found, tuple[float, float]]:
-        """Return what is found in the steps of a loop, and its contrasts (see `ServoFit`)."""
+        """Fit in the steps of the loop, with its contrasts (see `ServoFit`)."""
         found = self.again(loop, p, free)
         if "a" not in free:
             return found if many else self._better(loop, free, found), (np.inf, np.inf)
@@ -78,7 +78,7 @@ class Valleys:
         return self._along(loop, free, found) if min(contrasts) < NARROW else found, contrasts
 
     def again(self, loop: ServoLoop, p: Mapping[str, float], free: Sequence[str]) -> Found:
-        """Return what is found in the steps of a loop, without leaving the valley."""
+        """Fit in the steps of the loop, within its valley."""
         return self._search(loop, p, free).best(p, REFINED)
 
     def at(self, loop: ServoLoop, found: Found, free: Sequence[str]) -> Found:
@@ -222,7 +222,7 @@ class Stages:
             return self._valleys.from_start(begin, free).p
 
     def beside(self, free: tuple[str, ...], p: Mapping[str, float], tried: Sequence[str], rounds: int) -> dict[str, Found]:
-        """Return what is found in coarse steps with each of further parameters, and without (as "")."""
+        """Coarse fits with each of further parameters, and without any (as "")."""
         with one_thread():
             found = {"": self._valleys.near(p, free, rounds)}
             return found | {name: self._valleys.near({**p, name: 0.0}, (*free, name), rounds) for name in tried}

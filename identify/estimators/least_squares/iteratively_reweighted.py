@@ -159,7 +159,7 @@ def _relative(problem: Problem, kinds: Kinds) -> Array:
 
 
 def _least(Y: Array, kinds: Kinds) -> Array:
-    """Return what counts as noise at least, shape (..., kind): a share of the measurements' rms."""
+    """Least noise, shape (..., kind): a share of the measurements' rms."""
     return np.maximum(EXACT * np.sqrt(np.mean(kinds.by_kind(Y) ** 2, axis=-2)), 1e-300)
 
 

@@ -57,7 +57,7 @@ def _length(problem: Problem) -> float:
 
 
 def selected(W: Array, valid: npt.NDArray[np.bool_], time: Array, log: Array, apart: float) -> npt.NDArray[np.bool_]:
-    """Return which rows are selected, shape (r,), by the greedy step k = argmax w_k' M^-1 w_k of `SelectedRows`.
+    """Mask of the selected rows, shape (r,), by the greedy step k = argmax w_k' M^-1 w_k of `SelectedRows`.
 
     Parameters
     ----------

@@ -112,7 +112,7 @@ class Cells:
 
 
 def hermite(s: float | Array, period: float) -> tuple[Array, Array, Array]:
-    """Return what (q0, qd0, q1, qd1) of a cell's nodes count for at its place s, in q, qd and qdd, shape (4, ...) each."""
+    """Hermite weights of (q0, qd0, q1, qd1) at place s of a cell, for q, qd and qdd, shape (4, ...) each."""
     s = np.asarray(s, dtype=np.float64)
     one, T = np.ones_like(s), period
     q = np.stack([2 * s**3 - 3 * s**2 + 1, T * (s**3 - 2 * s**2 + s), 3 * s**2 - 2 * s**3, T * (s**3 - s**2)])

@@ -74,7 +74,7 @@ class JointFit:
     def start(
         cls, logs: tuple[Cells, ...], basis: Basis, X: Array, levels: NoiseLevels, *, find_delay: bool = False
     ) -> "JointFit":
-        """Return where to begin: logged positions and their differences at the nodes."""
+        """Initial fit: logged positions and their differences at the nodes."""
         return cls(logs, basis, X, tuple(_begin(cells) for cells in logs), levels, 0.0 if find_delay else None)
 
     @property
@@ -170,13 +170,13 @@ class JointFit:
         return self.levels.torque if self.near is None else self.near
 
     def _turns(self, cells: Cells, z: Array, qd: Array, slow: npt.NDArray[np.bool_]) -> Turns:
-        """Return what is known of slow cells, shape (joint, cell)."""
+        """Mask of slow cells, shape (joint, cell)."""
         if self.near is None:
             return Turns.none((self.basis.n, cells.count))
         return Turns.of(cells, self.basis, self.X, z, stretches(qd, slow), self.near)
 
     def _velocities(self, cells: Cells, known: npt.NDArray[np.bool_]) -> tuple[Array, Array]:
-        """Return how far velocities of nodes may be from differences of the positions, and these, shape (node, joint) each.
+        """Tolerance of node velocities about differences of the positions, and these, shape (node, joint) each.
 
         Where the sign of friction is not known, torques leave the velocities to the positions, a sample a cell, between which
         they would swing. Differences are off by noise, and by what a joint that starts or stops accelerates in a period.
@@ -238,7 +238,7 @@ def _differences(cells: Cells) -> Array:
 
 
 def _nodes(cells: Cells) -> tuple[Array, Array]:
-    """Return where nodes lie among the samples [s], and by how much beyond their ends."""
+    """Offset of the nodes from the samples [s], and their reach beyond the ends."""
     nodes = np.arange(cells.count + 1) * cells.period + cells.delay
     inside = np.clip(nodes, 0, (cells.log.samples - 1) * cells.period)
     return inside, nodes - inside

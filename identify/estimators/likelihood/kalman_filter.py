@@ -97,7 +97,7 @@ class UnscentedKalmanFilter(AbstractEstimator):
 def _tried(
     problem: Problem, run: tuple[int, ...], begin: tuple[Array, Array], noise: NoiseLevels, tuning: float
 ) -> tuple[float, Array, Array, Array] | None:
-    """Return what `_filtered` does, None if it diverges."""
+    """Result of `_filtered`; None if it diverges."""
     try:
         return _filtered(problem, run, *begin, noise, tuning)
     except np.linalg.LinAlgError:

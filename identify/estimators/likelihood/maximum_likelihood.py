@@ -92,7 +92,7 @@ def _covariance(fit: JointFit, log: int) -> Array:
 
 
 def _windows(inverse: BandMatrix, n: int) -> Array:
-    """Return what the inverse has of both nodes of every cell, joint by joint, shape (cell, joint, 4, 4)."""
+    """Blocks of the inverse at both nodes of every cell, joint by joint, shape (cell, joint, 4, 4)."""
     cells = len(inverse.lower) // (2 * n) - 1
     found, first = np.zeros((cells, n, 4, 4)), 2 * n * np.arange(cells)[:, None] + np.arange(n)
     for k in range(4):

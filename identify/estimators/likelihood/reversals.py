@@ -32,7 +32,7 @@ class Inside:
     """Signs of the velocities, 0 where they have their own, shape (joint, cell)."""
 
     def jumps(self, basis: Basis, points: list[tuple[Array, Array, Array]], D: Array, part: slice) -> "Jumps":
-        """Return what reversals in a part of the cells change, of columns D, shape (point, cell, joint, p), at two points."""
+        """Change of the columns D, shape (point, cell, joint, p), by reversals within cells, at two points."""
         which = np.flatnonzero((self.cell >= part.start) & (self.cell < part.stop))
         cell = self.cell[which] - part.start
         joint = self.joint[which]
@@ -178,12 +178,12 @@ class Turns:
 
     @classmethod
     def none(cls, shape: tuple[int, int]) -> Self:
-        """Return that friction in slow cells, shape (joint, cell), is left out."""
+        """Turns that leave out friction in slow cells, shape (joint, cell)."""
         return cls([], np.zeros(shape, dtype=bool), np.zeros(shape))
 
     @classmethod
     def of(cls, cells: Cells, basis: Basis, X: Array, z: Array, found: list[ReversalStretch], margin: Array) -> Self:
-        """Return what a motion z says of stretches; `margin` is how well torques are known near reversals, shape (joint,)."""
+        """Stretches of a motion z; `margin` is the uncertainty of torques near reversals, shape (joint,)."""
         turns = cls.none((basis.n, cells.count))
         for joint in sorted({one.joint for one in found}):
             own = [turns._slowest(one, z[one.begin : one.end, 1, joint]) for one in found if one.joint == joint]
@@ -231,7 +231,7 @@ class Turns:
         self.near[row, one.begin : one.end], self.sign[row, one.begin : one.end] = sign != 0, sign
 
     def at(self, z: Array) -> Inside:
-        """Return where the reversals of a motion z, shape (node, 2, joint), lie."""
+        """Reversals of a motion z, shape (node, 2, joint)."""
         joint, cell = (np.array([one[k] for one in self.crossings], dtype=np.intp) for k in (0, 1))
         after, ratio = (np.array([one[k] for one in self.crossings]) for k in (2, 3))
         early = np.maximum(-after * z[cell, 1, joint], 0.0) * ratio

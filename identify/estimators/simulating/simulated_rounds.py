@@ -58,7 +58,7 @@ class Rounds:
         self.simulations, self.active = np.zeros(runs, dtype=np.intp), np.ones(runs, dtype=bool)
 
     def start(self) -> Array:
-        """Return where to begin, shape (..., p)."""
+        """Initial parameters, shape (..., p)."""
         X = starting_point(self.problem)
         for run in map(tuple, np.argwhere(~np.isfinite(X).all(axis=-1)).tolist()):
             self.fail(run, "its rows do not determine the parameters")
@@ -206,7 +206,7 @@ def require_explicit(problem: Problem, name: str, what: str, other: str = "") ->
 
 
 def starting_point(problem: Problem) -> Array:
-    """Return where estimators begin that simulate or filter, shape (..., p): what is given, or weighted least squares."""
+    """Initial parameters of estimators that simulate or filter, shape (..., p): given, or by weighted least squares."""
     if problem.simulation.start is None:
         return problem.scaled_factors.fit(2).X
     shape = *problem.factors.together.status.shape, len(problem.names)
@@ -221,7 +221,7 @@ def loop_of(problem: Problem) -> AbstractLoop:
 
 
 def rates(problem: Problem) -> list[tuple[slice, float]]:
-    """Return which rows are those of each log, and how many instants [1/s] they have."""
+    """Rows of each log, and their rate [1/s]."""
     maps = problem.rows.maps
     return [(problem.rows.of_log(k), part.signals.fs / part.grid.step) for k, part in enumerate(maps)]
 
