@@ -95,7 +95,7 @@ class IncrementalEncoder(AbstractEncoder):
         return _Reader(self, per_joint(self.lines, n, "encoder.lines"), noise, missed)
 
     def spread(self, n: int) -> Array:
-        """Return what counts, step / sqrt(12), noise and interpolation error make together."""
+        """Standard deviation of counts (step / sqrt(12)), noise and interpolation error together."""
         period = 2 * np.pi / per_joint(self.lines, n, "encoder.lines")
         return np.sqrt((period / self.quadrature) ** 2 / 12 + self.noise**2 + (self.interpolation_error * period) ** 2 / 2)
 

@@ -84,7 +84,7 @@ def make(cls: type, content: object, where: str) -> Any:
 
 
 def complaints(error: ValidationError, cls: type, where: str = "") -> list[str]:
-    """Return what is wrong, one sentence a setting: its key, its value, what is allowed, the nearest known key."""
+    """Errors, one sentence per setting: its key, its value, what is allowed, the nearest known key."""
     return list(dict.fromkeys(_complaint(detail, cls, where) for detail in error.errors(include_url=False)))
 
 
@@ -135,7 +135,7 @@ def fields_of(cls: type) -> dict[str, Any]:
 
 
 def description(cls: type, key: str) -> str:
-    """Return what a field is, with its unit and range, in one line."""
+    """Text of a field, with its unit and range, in one line."""
     texts = (_docstrings(owner)[key] for owner in cls.__mro__ if key in _docstrings(owner))
     return " ".join(next(texts, "").split()).rstrip(".")
 
@@ -167,7 +167,7 @@ def limits(cls: type, key: str) -> str:
 
 
 def _metadata(annotation: Any) -> list[Any]:
-    """Return what is attached to a type and to the types that it is made of."""
+    """Annotations of a type and of the types that it is made of."""
     own = [inner for m in getattr(annotation, "__metadata__", ()) for inner in getattr(m, "metadata", [m])]
     return own + [m for part in getattr(annotation, "__args__", ()) for m in _metadata(part)]
 

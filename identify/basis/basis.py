@@ -181,7 +181,7 @@ class Basis:
         return self._sum(state, "dissipation")
 
     def _sum(self, state: State, function: str) -> Columns:
-        """Return what a column function of every block gives, together."""
+        """Columns of every block by one column function, together."""
         shape, total = (*state.q.shape[:-2], state.q.shape[-1]), dict[tuple[int, int], Array]()
         for block in self.blocks:
             held, found = self.held_of(block), getattr(block, function)(state)
@@ -201,7 +201,7 @@ class Basis:
         return total
 
     def held_of(self, block: AbstractBlock) -> dict[Parameter, Array | float]:
-        """Return what the columns of a block that are no part of W X are multiplied by.
+        """Values by which the columns of a block that are no part of W X are multiplied.
 
         With a slope F g'(b) as the column of b, F g(b) + F g'(b) (b - b0) has - F g'(b) b0 that depends on no parameter.
         """

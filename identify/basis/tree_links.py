@@ -90,11 +90,11 @@ class Wrench(NamedTuple):
 
     @classmethod
     def weight(cls, up: Vector) -> Self:
-        """Return what holds a link against gravity: a = -g."""
+        """Acceleration that holds a link against gravity: a = -g."""
         return cls(up, NOTHING, (ZERO,) * 6)
 
     def along(self, twist: Twist, parameter: int) -> Term:
-        """Return what a parameter, by its number in INERTIAL, adds to the power of force and moment along a unit motion."""
+        """Power of a parameter's force and moment along a unit motion, by its number in INERTIAL."""
         if parameter < MX:
             return dot(twist.w, self.J[parameter])
         if parameter == M:
@@ -116,7 +116,7 @@ def _inertia_times(w: Vector) -> tuple[Vector, ...]:
 
 
 def energy(V: Twist, up: Vector, height: Term) -> tuple[Term, ...]:
-    """Return what each parameter adds to kinetic plus potential energy."""
+    """Kinetic plus potential energy per parameter."""
     v, w = V
     half = scaled(0.5, w)
     squares = times(half.x, w.x), times(w.x, w.y), times(w.x, w.z), times(half.y, w.y), times(w.y, w.z), times(half.z, w.z)

@@ -166,7 +166,7 @@ def torque_stretches(columns: LogColumns) -> tuple[LogColumns, list[tuple[float,
 
 
 def _fresh(columns: LogColumns, rows: npt.NDArray[np.intp]) -> npt.NDArray[np.bool_]:
-    """Return which rows do not repeat the one before; where the robot stands, repeats are no fault.
+    """Mask of rows that do not repeat the one before; where the robot stands, repeats are no fault.
 
     Positions alone repeat wherever their encoder is coarse: they say nothing.
     """
@@ -222,13 +222,13 @@ def _numbered(t: Array, fs: float) -> Array:
 
 
 def _about_steady(t: Array) -> Array:
-    """Return how far times are from a steady clock; nothing where they are not of one."""
+    """Deviation of times from a steady clock; nothing where they are not of one."""
     clocks = dict(_clocks(t))
     return clocks["steady"] - t if "steady" in clocks else np.zeros(1)
 
 
 def _roughness(t: Array, q: Array) -> float:
-    """Return how far positions are from what interpolates their neighbours, all joints alike; without the worst of the rows.
+    """Deviation of positions from the interpolation of their neighbours, all joints alike; without the worst of the rows.
 
     Rows at which the neighbours lie further apart than usual say little, and are left out.
     """

@@ -152,7 +152,7 @@ class Velocities:
 
     @classmethod
     def of(cls, q: Array, qd: Array, fs: float) -> "Velocities":
-        """Return what the logged velocities `qd` of the positions `q` are worth, shape (time, joint) each.
+        """Quality of the logged velocities `qd` of the positions `q`, shape (time, joint) each.
 
         White noise of the positions, of standard deviation sigma_q, and of the velocities, sigma_v, is compared: integrated,
         the latter is sigma_v / (2 pi f), less than sigma_q above f = sigma_v / (2 pi sigma_q).
@@ -180,7 +180,7 @@ class Velocities:
         return np.logical_and(self.consistent, self.crossover < min(HIGHEST, self.fs / 10))
 
     def words(self, joints: tuple[str, ...]) -> list[str]:
-        """Return what was found, a sentence each."""
+        """Findings, one sentence each."""
         found = []
         if self.used.any():
             each = [

@@ -49,7 +49,7 @@ class LogColumns:
         return self.q.shape[1]
 
     def prefixed(self, joints: Sequence[str]) -> str:
-        """Return what stands before all names of the log and not before those of `joints`, as in fer_joint1, or else ""."""
+        """Common prefix of the log's names that those of `joints` lack, as in fer_joint1, or else ""."""
         for joint in joints:
             before = next((name.removesuffix(joint) for name in self.joints if name.endswith(joint)), "")
             if before and {before + name for name in joints} == set(self.joints):

@@ -169,7 +169,7 @@ def _uniform(part: LogColumns, torque: TorqueChannel, fs: float) -> tuple[Motion
 
 
 def _conditions(part: LogColumns, log: MotionLog, *, as_is: bool) -> dict[str, Array]:
-    """Return what else a piece says, at the times of its log."""
+    """Further columns of a piece, at the times of its log."""
     if as_is:
         return part.conditions
     start = max(part.t[0], part.t_tau[0]) if part.t_tau is not None else part.t[0]

@@ -88,7 +88,7 @@ class Information:
         return self.columns(motion) * self.weight(motion)[..., None]
 
     def weight(self, motion: Array) -> Array:
-        """Return how much rows count, qd^2 / (qd^2 + SLOW^2 + (TURNING qdd)^2), shape (..., time, joint)."""
+        """Weights of the rows, qd^2 / (qd^2 + SLOW^2 + (TURNING qdd)^2), shape (..., time, joint)."""
         squares = motion[..., 1, :, :] ** 2
         return np.asarray(squares / (squares + SLOW**2 + (TURNING * motion[..., 2, :, :]) ** 2))
 
@@ -118,7 +118,7 @@ class Information:
         return np.array([parameter.kind in FRICTION for parameter in self.basis.parameters])
 
     def slope(self, motion: Array, of_rows: Array, of_torques: Array) -> Array:
-        """Return how sums of products with columns grow with positions, velocities and accelerations.
+        """Gradient of sums of products with columns by positions, velocities and accelerations.
 
         Parameters
         ----------
@@ -163,7 +163,7 @@ class Information:
         return np.stack([2 * qd * slow / total, -2 * TURNING**2 * qdd * qd**2 / total])
 
     def torques(self, motion: Array, W: Array, X: Array) -> Array:
-        """Return what each parameter adds to the torques, shape (..., time, joint, p), frictions fading at low speed."""
+        """Torque per parameter, shape (..., time, joint, p), frictions fading at low speed."""
         return W * X * np.where(self._frictions, self.weight(motion)[..., None], 1.0)
 
 

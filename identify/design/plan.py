@@ -76,13 +76,13 @@ class Plan:
         return self.known + self.repeat * self.information.matrix(self.information.weighted(motion))
 
     def excess(self, c: Array) -> float:
-        """Return what coefficients, shape (m, joint), cost beyond what the criterion says: 0 where limits are kept."""
+        """Penalty of coefficients, shape (m, joint), beyond the criterion: 0 where limits are kept."""
         whole = self._with_way(self.motion(c))
         cost, _ = self._torque_cost(whole, self.information.columns(whole), self.states.values.shape[1])
         return cost + (self.hard * self.obstacles(whole[0])[0] if self.obstacles else 0.0)
 
     def value(self, c: Array) -> tuple[float, Array]:
-        """Return what coefficients, shape (m, joint), cost, and the slope."""
+        """Cost of coefficients, shape (m, joint), and its gradient."""
         scale, of_scale = self._scale(c)
         raw = self.states.at(c)
         motion = raw * scale
@@ -93,7 +93,7 @@ class Plan:
         return cost, back * scale + by_scale * of_scale
 
     def _cost(self, motion: Array) -> tuple[float, Array]:
-        """Return what a motion costs, and the slope by its positions, velocities and accelerations, shape (3, time, joint)."""
+        """Cost of a motion, and its gradient by positions, velocities and accelerations, shape (3, time, joint)."""
         whole, count = self._with_way(motion), motion.shape[-2]
         D = self.information.columns(whole)
         W = D[:count] * self.information.weight(motion)[..., None]
@@ -123,7 +123,7 @@ class Plan:
         return np.concatenate([motion, way], axis=1)
 
     def _torque_cost(self, motion: Array, D: Array, count: int) -> tuple[float, Array]:
-        """Return what torques beyond their limits cost, and the slope by columns; the mean is that of `count` states."""
+        """Penalty of torques beyond their limits, and its gradient by columns; the mean is that of `count` states."""
         parts = self.information.torques(motion, D, self.X)
         tau, spread = parts.sum(axis=-1), np.abs(parts).sum(axis=-1)
         most, worst = 1 / (self.torque_share * self.limits.torque), 1 / self.limits.torque
@@ -138,7 +138,7 @@ class Plan:
         return float(cost), (by_tau[..., None] + by_spread[..., None] * np.sign(parts)) * self.X
 
     def _scale(self, c: Array) -> tuple[Array, Array]:
-        """Return what the joints' motions are multiplied by, shape (..., joint), and its slope, shape (..., m, joint)."""
+        """Scale of the joints' motions, shape (..., joint), and its gradient, shape (..., m, joint)."""
         sizes = SLACK * self.limits.sizes
         use = self.instants.at(c) / sizes
         largest = np.abs(use).max(axis=(-3, -2), keepdims=True)

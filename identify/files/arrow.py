@@ -98,7 +98,7 @@ def _opened(path: Path) -> IO[bytes]:
 
 
 def _held(path: Path) -> "pa.BufferReader":
-    """Return what a file holds, in memory of pyarrow's own.
+    """Content of a file, in memory of pyarrow's own.
 
     Its threads that read a file of Python's abort a process that ends meanwhile (apache/arrow 50482), and its own way to open
     one takes names in UTF-8 alone.
@@ -112,7 +112,7 @@ def _held(path: Path) -> "pa.BufferReader":
 
 
 def _head(path: Path) -> tuple[int, list[str], bytes]:
-    """Return how many lines to pass over, names if the file has no line of them there, and what separates columns."""
+    """Number of lines to skip, names if the file has no line of them there, and the separator."""
     with _opened(path) as file:
         lines = [file.readline() for _ in range(200)]
     skipped = next((i for i, line in enumerate(lines) if line.strip() and line[:1] not in b"#%"), 0)

@@ -111,7 +111,7 @@ FOREIGN = {
 
 
 def kind_of(path: Path) -> str:
-    """Return what the name of a file ends with, without what says that it is packed."""
+    """Suffix of a file's name, without that of compression."""
     return Path(path.stem).suffix.lower() if path.suffix.lower() == ".gz" else path.suffix.lower()
 
 
@@ -127,7 +127,7 @@ ROBOTS = (".urdf", ".mjcf", ".xacro", ".sdf")  # Endings of files of robots, whi
 
 
 def read_table(path: Path) -> LogTable:
-    """Return what a file holds.
+    """Content of a file.
 
     Raises
     ------

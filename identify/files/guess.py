@@ -79,7 +79,7 @@ class Guess:
 
 
 def guess(path: Path, table: LogTable | None = None) -> Guess:
-    """Return what the columns of a file probably are.
+    """Probable layout of a file's columns.
 
     Parameters
     ----------
@@ -115,7 +115,7 @@ def guess(path: Path, table: LogTable | None = None) -> Guess:
 
 
 def _episodes(table: LogTable) -> tuple[dict[str, float], list[str]]:
-    """Return which rows are one run, where a file has several: the first episode."""
+    """Rows of the first episode, where a file has several."""
     for name, column in table.columns.items():
         if name.lower() in EPISODES and column.ndim == 1 and len(values := np.unique(column)) > 1:
             first = float(values[0])
@@ -178,7 +178,7 @@ def _by_names(table: LogTable) -> LogLayout:
 
 
 def kind_of(name: str) -> str:
-    """Return what the name of a column stands for, of `WORDS`; empty if it looks like none of them."""
+    """Quantity that a column's name stands for, of `WORDS`; empty if it looks like none of them."""
     found = _parsed(name)
     return found.kind if found else ""
 
@@ -213,7 +213,7 @@ def _groups(table: LogTable) -> dict[tuple[str, str], list[tuple[str, str]]]:
 
 
 def _parsed(name: str) -> _Name | None:
-    """Return what a column's name says; None if it is nothing that was measured of a joint, or a time."""
+    """Quantity and joint of a column's name; None if it is neither a joint's quantity nor a time."""
     bare = re.sub(r"\s*[\[(][^\])]*[\])]\s*$", "", name)
     tokens = re.findall(r"[a-z]+|\d+", re.sub(r"(?<=[a-z])(?=[A-Z])", "_", bare).lower())
     if set(tokens) & set(OTHERS):

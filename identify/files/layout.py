@@ -47,7 +47,7 @@ class Source:
         return tuple(name for name in self.columns if name != UNLOGGED)
 
     def scale(self, quantity: str) -> float:
-        """Return what turns its values into SI."""
+        """Factor from its values to SI."""
         return factor(quantity, self.unit or SI[quantity])
 
 
@@ -145,7 +145,7 @@ class LogLayout:
         return replace(self, **changed)
 
     def words(self, path: Path) -> str:
-        """Return which file says what columns are, and in which units."""
+        """File that describes columns and units."""
         each = [
             f"{name} from {', '.join(source.columns[:3])}{', ...' * (len(source.columns) > 3)} in {source.unit or SI[name]}"
             for name in QUANTITIES

@@ -237,7 +237,7 @@ class LogFiles:
         return np.array(gain or (1.0,))
 
     def _stated(self) -> TorqueChannel | None:
-        """Return what the file with the torques says of them itself."""
+        """Statements of the file about its torques."""
         path = self._path(self.layout.tau)
         stated = self._table(path).torque
         if stated is None:
@@ -259,7 +259,7 @@ class LogFiles:
         return self.tables[path]
 
     def _rows(self, path: Path) -> slice | Array:
-        """Return which rows of a file belong to the log."""
+        """Rows of a file that belong to the log."""
         kept = None
         for name, value in self.layout.rows.items():
             if path != self.log and name not in self._table(path).columns:

@@ -48,7 +48,7 @@ class ServoFile:
 
     @classmethod
     def read(cls, path: Path) -> "ServoFile":
-        r"""Return what a file states; raise SettingError that names what is unknown or wrong in it.
+        r"""Content of a file; raise SettingError that names what is unknown or wrong in it.
 
         Examples
         --------
@@ -113,12 +113,12 @@ class ServoFile:
         return str(self.folder / name) if name and (self.folder / name).exists() else name
 
     def _of_log(self, log: str) -> dict[str, Any]:
-        """Return what is stated of a log; later patterns go before earlier ones."""
+        """Statements about a log; later patterns override earlier ones."""
         return {key: x for pattern, part in self.logs.items() if fnmatchcase(log, pattern) for key, x in part.items()}
 
 
 def _of_model(model: Any, stated: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what is stated with what is published of a model."""
+    """Statements, completed by the published data of a model."""
     if model not in PUBLISHED:
         raise SettingError(f"model = {model!r} is unknown{did_you_mean(str(model), PUBLISHED)}; {_published()}")
     known = PUBLISHED[model]

@@ -183,7 +183,7 @@ def ordered(columns: ServoColumns, joints: Sequence[str], actuators: Mapping[str
 
 
 def _order(columns: ServoColumns, joints: Sequence[str], path: Path) -> list[int]:
-    """Return which column belongs to each of the joints."""
+    """Column of each joint."""
     if columns.joints:
         if missing := [joint for joint in joints if joint not in columns.joints]:
             raise LogError(f"{path} names the joints {', '.join(columns.joints)}; the robot's {', '.join(missing)} is missing")

@@ -64,7 +64,7 @@ NEED_GAIN = ("A", "mA", "%")  # Units of efforts that a gain makes torques [N m]
 
 
 def factor(quantity: str, unit: str) -> float:
-    """Return what turns values in a unit into SI; raise SettingError if it is none of this quantity."""
+    """Factor from values in a unit to SI; raise SettingError if it is none of this quantity."""
     known = UNITS[quantity]
     plain = _plain(unit)
     for name, size in known.items():

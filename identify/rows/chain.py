@@ -61,7 +61,7 @@ class Chain:
         return self.prefilter.suited(velocities)
 
     def grid(self, log: MotionLog) -> Grid:
-        """Return where the rows of `log` lie; raise LogError if it leaves none, SettingError if a setting does not fit it."""
+        """Instants of the rows of `log`; raise LogError if it leaves none, SettingError if a setting does not fit it."""
         return self.operator.grid(log.samples, log.fs, self.margin(log))
 
     def rows(self, signals: Signals, basis: Basis, model: AbstractModel) -> Rows:
@@ -83,7 +83,7 @@ class Chain:
         return Rows.of(equations, self.map(equations))
 
     def map(self, equations: Equations) -> RowMap:
-        """Return how samples become the rows of a model's equations."""
+        """Linear map from samples to the rows of a model's equations."""
         return self.operator.map(equations, equations.weight, self._grid_of(equations.signals))
 
     def _grid_of(self, signals: Signals) -> Grid:
@@ -106,7 +106,7 @@ class Chain:
         return replace(self, operator=Windows())
 
     def halo(self, fs: float, channel: TorqueChannel) -> float:
-        """Return how far [s] a row looks to either side of its instant, in a log at `fs` [Hz] with this torque channel."""
+        """Reach of a row to either side of its instant [s], in a log at `fs` [Hz] with this torque channel."""
         torque = self.alignment.align(np.empty((0, 0)), channel, fs)  # how far it looks does not depend on the values
         derivatives = 2 * self.differentiator.halo(fs)  # of q, and of qd or e
         stages = self.prefilter.halo(fs), derivatives, self.mask.halo(fs), torque.halo(), self.operator.halo(fs)

@@ -143,7 +143,7 @@ class Factor:
         raise ExcitationError(self.explain(run) + where, self.hidden(run))
 
     def explain(self, run: tuple[int, ...] = ()) -> str:
-        """Return why a run whose status is not OK cannot be solved, and what to do."""
+        """Reason why a run whose status is not OK cannot be solved, and the way out."""
         if self.status[run] == Status.TOO_FEW_ROWS:
             return (
                 f"{self.rows[run]} rows are left by the mask for {self.p} parameters: use a longer motion, in which every "

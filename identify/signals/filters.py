@@ -107,7 +107,7 @@ class AbstractDifferentiator(ABC):
 
     @abstractmethod
     def halo(self, fs: float) -> float:
-        """Return how far [s] the derivative looks to either side."""
+        """Reach of the derivative to either side [s]."""
 
     @abstractmethod
     def derivative(self, x: Array, fs: float) -> Array:

@@ -42,7 +42,7 @@ class State:
         return cls(q, s(q), s, conditions or {})
 
     def condition(self, name: str) -> Array:
-        """Return what else the log says, shape (..., joint or 1, time); raise LogError if it says nothing of it."""
+        """A further column of the log, shape (..., joint or 1, time); raise LogError if there is none."""
         if name not in self.conditions:
             known = ", ".join(self.conditions) or "nothing beside motion and torque"
             raise LogError(f"the log does not say the {name} that a law needs; it has {known}: see `idbench log`")

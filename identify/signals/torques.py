@@ -69,7 +69,7 @@ class Torque:
         return self.delay * self.fs + self._reading.middle
 
     def halo(self) -> float:
-        """Return how far [s] the mean torque and averaged columns look to either side."""
+        """Reach of the mean torque and averaged columns to either side [s]."""
         moved, window = self._late != 0 or any(self.lags), self._reading.torque + self._reading.columns > 0
         return abs(self.delay) + max(map(abs, self.lags), default=0.0) + ((REACH + 1) * moved + window) / self.fs
 

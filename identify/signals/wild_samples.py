@@ -55,7 +55,7 @@ def _scale(off: Array) -> Array:
 
 
 def _off(x: Array) -> Array:
-    """Return how far samples are from the cubic through their neighbours, shape (..., time), 0 at the ends."""
+    """Distance of samples from the cubic through their neighbours, shape (..., time), 0 at the ends."""
     off = np.abs(x - scipy.ndimage.correlate1d(x, CUBIC, axis=-1))
     off[..., :REACH] = off[..., -REACH:] = 0.0
     return np.asarray(off)

@@ -91,7 +91,7 @@ class _Amplifier(AbstractAmplifier):
         return (self._K * current)[None]
 
     def _relaxed(self, rest: Array) -> tuple[Array, Array]:
-        """Return what a deviation becomes after a time [s], exp(-w t), and minus its integral, (exp(-w t) - 1) / w."""
+        """Decay of a deviation after a time [s], exp(-w t), and minus its integral, (exp(-w t) - 1) / w."""
         return np.exp(-self._w * rest), np.expm1(-self._w * rest) / self._w
 
     def _wholly(self, steps: int) -> tuple[Array, Array]:
@@ -108,7 +108,7 @@ class _Amplifier(AbstractAmplifier):
         return Electric(reference, current, voltage, duty, limited, e)
 
     def _release(self, v: Array, target: Array, e: Array) -> Array:
-        """Return how long [s] the loop asks for more than the voltage `v`, which is all there is."""
+        """Time [s] for which the loop asks for more than the voltage `v`, which is all there is."""
         R = self._R
         L = self._L
         w = self._w

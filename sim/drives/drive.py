@@ -96,7 +96,7 @@ class AbstractAmplifier(ABC):
         """
 
     def between_edges(self, trace: Trace) -> BetweenEdges | None:
-        """Return what windings of the first simulation did within the steps of a trace; None for a drive that has no edges."""
+        """Currents of the first simulation within the steps of a trace; None for a drive that has no edges."""
         return None
 
 
@@ -134,7 +134,7 @@ class AbstractDrive(ABC):
         return False
 
     def conditions(self, t: Array, command: Array) -> dict[str, Array]:
-        """Return what the log says beside motion and torque at its instants t [s], shape (nsim, time, joint) or less.
+        """Further columns of the log at its instants t [s], shape (nsim, time, joint) or less.
 
         Parameters
         ----------
@@ -147,7 +147,7 @@ class AbstractDrive(ABC):
 
     @abstractmethod
     def lag(self, robot: Robot) -> Array:
-        """Return how late the torque follows a slow command [s], shape (joint,)."""
+        """Lag of the torque behind a slow command [s], shape (joint,)."""
 
     @property
     @abstractmethod

@@ -99,7 +99,7 @@ class Bench:
         return self._clock.per_sample if self._steady else max(1, round(BLOCK / self._h))
 
     def _drawn_jitter(self, samples: int) -> Array:
-        """Return by how many steps each sample is off its claimed instant, or older, shape (sample, nsim)."""
+        """Offset of each sample from its claimed instant, or its age, shape (sample, nsim) [steps]."""
         width = self._scenario.timing.jitter / self._h
         if width >= self._clock.per_sample:
             raise ScenarioError(
@@ -163,7 +163,7 @@ class Bench:
         return steps
 
     def _final(self, step: int) -> int:
-        """Return how many samples nothing can change any more at the beginning of physics step `step`."""
+        """Number of samples that are final at the beginning of physics step `step`."""
         clock, samples = self._clock, len(self._q)
         return min(samples, step // clock.per_sample, max(0, (step - clock.late - 1) // clock.per_sample + 1))
 
@@ -213,7 +213,7 @@ class Bench:
         return self._failures.reasons
 
     def run(self, skipped: int) -> Run:
-        """Return what has happened since sample `skipped`."""
+        """Records since sample `skipped`."""
         channels = self._measured, self._commands, self._currents, self._q, self._speeds, self._tau / self._clock.per_sample
         measured, command, current, q, qd, tau = (np.swapaxes(x[skipped:], 0, 1) for x in channels)
         for sim in np.flatnonzero(~np.isfinite(command).all(axis=(1, 2))):
@@ -251,7 +251,7 @@ def _holding(scenario: Scenario, robot: Robot, at_rest: Array, vary: Mapping[str
 
 
 def _started(settings: object, made: T, kind: type) -> T:
-    """Return what a plug-in started; raise PluginError if that is something else."""
+    """Object that a plug-in started; raise PluginError if it is of another kind."""
     if not isinstance(made, kind):
         raise PluginError(f"plug-in {type(settings).__name__}.start returned {made!r:.60}, expected an {kind.__name__}")
     return made

@@ -39,7 +39,7 @@ class Replay:
 
 
 def replays(robots: Sequence[Robot], logs: Sequence[MotionLog], qd: Array, bandwidth: float) -> list[Replay | str]:
-    """Return what robots do with torques, as batches of those that are alike; of one that runs away, when and how.
+    """Motions of robots under torques, in batches of those that are alike; of one that runs away, when and how.
 
     The torques act as their log's channel says; the loop adds M (w^2 e + 2 w de/dt), M the diagonal of the inertia matrix. A
     robot with the parameters of the one that was logged needs no feedback, beside noise.
@@ -179,7 +179,7 @@ def _start(
 
 
 def physics_of(robot: Robot, log: MotionLog) -> Physics:
-    """Return how a robot is integrated that a log drives, in whole steps a sample.
+    """Integration of a robot that a log drives, in whole steps per sample.
 
     RK4 follows joints that viscous friction stops in M / Fv with as long a step, and becomes unstable where a step is 2.8 times
     as long: what stops in less than the shortest is integrated implicitly (to first order, and half a step early).

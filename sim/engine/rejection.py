@@ -25,7 +25,7 @@ class Rejection:
     """Rms of the logged torque about its mean [N m], shape (joint,)."""
 
     def words(self, joints: Sequence[str], wdyn: float | None) -> str:
-        """Return how much of each joint's logged torque is rejection, in a line."""
+        """Share of rejection in each joint's logged torque, in a line."""
         rms, of = self.rejected.std(axis=0), self.ripple.std(axis=0)
         each = [
             f"{name} {r:.2g} of {x:.2g} N m, {100 * r / y:.2g} % of the logged torque"
@@ -36,7 +36,7 @@ class Rejection:
 
 
 def rejection(run: Run, i: int = 0) -> Rejection | None:
-    """Return what the loop of a simulation rejects; None if its drives add nothing, or if it commands no torques.
+    """Torques that the loop of a simulation rejects; None if its drives add nothing, or if it commands no torques.
 
     Were there no ripple d, positions would differ by delta and commands by v: with the law u(k, q) of the controller,
 

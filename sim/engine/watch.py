@@ -181,7 +181,7 @@ class _Rows:
         return Electric(*(np.add.reduceat(x[keep] * weights, begins, axis=0) for x in self.electric))
 
     def inside(self, window: tuple[float, float], h: float, before: float, drive: AbstractAmplifier) -> Inner | None:
-        """Return what lies in the window [s], None if nothing does."""
+        """Part within the window [s], None if there is none."""
         t = self.start * h - before
         within = (t > window[0] - h / 2) & (t < window[1] - h / 2)  # half a step aside, where rounding decides nothing
         if not within.any():

@@ -55,11 +55,11 @@ class AbstractFrictionLaw(ABC):
                 joint.frictionloss = value
 
     def truth(self, robot: Robot) -> dict[str, float]:
-        """Return what identification may find of it beside Fv and Fs, by the names of `identify`, such as vs1."""
+        """True parameters of it beside Fv and Fs, by the names of `identify`, such as vs1."""
         return {}
 
     def conditions(self, t: Array, n: int) -> dict[str, Array]:
-        """Return what the log says beside motion and torque at its instants t [s], shape (time, joint or 1)."""
+        """Further columns of the log at its instants t [s], shape (time, joint or 1)."""
         return {}
 
     @abstractmethod

@@ -140,7 +140,7 @@ class Asymmetric(AbstractFrictionLaw):
         return {named(letters, j): float(x) for letters, values in pairs for j, x in enumerate(values)}
 
     def start(self, plant: Batch, Fs: Array, h: float) -> AbstractContact:
-        """Return what the directions differ by; MuJoCo makes the rest."""
+        """Difference between the directions; MuJoCo makes the rest."""
         n = Fs.shape[-1]
         return _AsymmetricContact(self._each("offset", n), self._each("difference", n), self.edge)
 
@@ -224,7 +224,7 @@ class Warming(AbstractFrictionLaw):
         return np.asarray(self.warm + (self.cold - self.warm) * np.exp(-np.asarray(t) / self.time))
 
     def start(self, plant: Batch, Fs: Array, h: float) -> AbstractContact:
-        """Return what the temperature adds."""
+        """Friction that the temperature adds."""
         return _TemperatureContact(self, per_joint(self.slope, Fs.shape[-1], "friction.slope"), h)
 
 

@@ -124,7 +124,7 @@ class Clearance:
         return found
 
     def names(self, pair: npt.NDArray[np.intp]) -> tuple[str, str]:
-        """Return what the shapes of a pair are called."""
+        """Names of the shapes of a pair."""
         m = self._model
         one, two = (m.geom(int(g)).name or f"a shape of {body_name(m, int(m.geom_bodyid[g]))}" for g in pair)
         return one, two
@@ -170,7 +170,7 @@ class Clearance:
         return found
 
     def cost(self, q: Array) -> tuple[float, Array]:
-        """Return what nearness costs at positions q, shape (time, joint), and its slope.
+        """Cost of nearness at positions q, shape (time, joint), and its gradient.
 
         The sum of (1 - distance / margin)^2 over instants and pairs that are nearer than a margin beyond the least distance.
         """
@@ -214,7 +214,7 @@ class Clearance:
         return Touch(float(found[k, i]), self.names(self.pairs[i]), int(fine[k]))
 
     def _reach(self, q: Array, speed: Array) -> Array:
-        """Return how fast pairs can approach at positions and speeds, shape (instant, joint), as (instant, pair) [m/s]."""
+        """Largest speed of approach of pairs at positions and speeds, shape (instant, joint), as (instant, pair) [m/s]."""
         pos, _, _, anchor = self._centres(q)
         r, bodies = self._model.geom_rbound, self._model.geom_bodyid
         total = np.zeros((len(q), len(self.pairs)))

@@ -128,7 +128,7 @@ def limits_of(robot: Robot, asked: MotionLimits) -> Limits:
 
 
 def home_position(robot: Robot, asked: MotionLimits, limits: Limits) -> Array:
-    """Return where the arm comes from [rad], shape (joint,): as asked, the keyframe `home`, or where the file puts it.
+    """Home position of the arm [rad], shape (joint,): as asked, the keyframe `home`, or where the file puts it.
 
     Raises
     ------
@@ -151,7 +151,7 @@ def home_position(robot: Robot, asked: MotionLimits, limits: Limits) -> Array:
 
 
 def looser(robot: Robot, asked: MotionLimits) -> list[str]:
-    """Return which limits that are asked for go beyond those of the robot's file, in words."""
+    """Limits that go beyond those of the robot's file, in words."""
     known = {name: robot.most(name) for name in RATES} | {"torque": robot.torque_limits}
     found = [
         f"position.{joint} may go from {low:g} to {high:g}, its file says {own[0]:.4g} to {own[1]:.4g}, which holds"

@@ -125,14 +125,14 @@ class _Values:
         return self.length("armature")
 
     def khalil(self) -> tuple[Array, Array]:
-        """Return where the frame of the joint stands in that of its antecedent."""
+        """Pose of the joint's frame in that of its antecedent."""
         first = _turn("z", self.angle("gamma")) @ _turn("x", self.angle("alpha"))
         rotation = first @ _turn("z", self.angle("theta"))
         position = np.array([0, 0, self.length("b")]) + first @ [self.length("d"), 0, self.length("r")]
         return position, rotation
 
     def classic(self) -> tuple[Array, Array]:
-        """Return where the next frame stands in that of this joint."""
+        """Pose of the next frame in that of this joint."""
         turned = _turn("z", self.angle("theta"))
         return np.array([0, 0, self.length("d")]) + turned @ [self.length("a"), 0, 0], turned @ _turn("x", self.angle("alpha"))
 

@@ -242,7 +242,7 @@ def _read(path: Path) -> tuple[mujoco.MjSpec, list[str]]:
 
 
 def _of_a_part(path: Path) -> str:
-    """Return which file to give instead of one that others include."""
+    """File to give instead of one that others include."""
     others = [other for other in sorted(path.parent.glob("*.xml")) if other != path and _includes(other, path.name)]
     named = f": give {' or '.join(map(str, others))}" if others else ", which is the one to give"
     return f"this file is a part that another includes{named}"
@@ -256,7 +256,7 @@ def _includes(other: Path, name: str) -> bool:
 
 
 def _smaller_side(limits: Array) -> float:
-    """Return how far a range goes to both sides of 0; of one that lies to one side of it, how far it goes."""
+    """Half width of a range about 0; of one that lies to one side of it, its farther end."""
     low, high = (float(x) for x in limits)
     return min(-low, high) if low < 0 < high else max(abs(low), abs(high))
 
@@ -270,7 +270,7 @@ def _name_joints(spec: mujoco.MjSpec) -> None:
 
 
 def _way_out(reason: str) -> str:
-    """Return what to do about a reason why MuJoCo does not compile a model."""
+    """Way out of a reason why MuJoCo does not compile a model."""
     if "mass and inertia" in reason:
         return "; give every body that a joint moves a mass and an inertia"
     if "eigenvalues" in reason or "A + B" in reason or "inertia must satisfy" in reason:

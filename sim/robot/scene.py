@@ -95,7 +95,7 @@ def _mesh(model: mujoco.MjModel, m: int) -> tuple[Array, npt.NDArray[np.int32]]:
 
 
 def motion(robot: Robot, q: Array) -> Motion:
-    """Return where the bodies and sites are at the positions `q` [rad], shape (time, joint)."""
+    """Poses of the bodies and sites at the positions `q` [rad], shape (time, joint)."""
     return Mover(robot).at(q)
 
 
@@ -115,7 +115,7 @@ class Mover:
         self._sites = {robot.model.site(s).name or f"site{s}": s for s in range(robot.model.nsite)}
 
     def at(self, q: Array) -> Motion:
-        """Return where the bodies and sites are at the positions `q` [rad], shape (time, joint)."""
+        """Poses of the bodies and sites at the positions `q` [rad], shape (time, joint)."""
         if self._states is None or len(q) != self._size:
             self._states, self._size = Batch(self._model, len(q)), len(q)
             names = ("qpos", "xpos", "xquat", "site_xpos")

@@ -13,7 +13,7 @@ VELOCITY = 2  # Place of what multiplies the velocity among the numbers of an ac
 
 
 def apparent_rotor_inertia(robot: Robot) -> Array:
-    """Return by how much rotors seem larger in torques that the robot's own actuators made, shape (joint,) [kg m^2, kg].
+    """Apparent additional rotor inertia in torques that the robot's own actuators made, shape (joint,) [kg m^2, kg].
 
     h (kv + D / 2) by the implicit integrators, h D / 2 by Euler's, and -h D / 2 where `eulerdamp` is disabled: see
     `torque_of_steps`.
@@ -26,7 +26,7 @@ def apparent_rotor_inertia(robot: Robot) -> Array:
 
 
 def torque_of_steps(robot: Robot, motion: Sequence[Array]) -> Array:
-    """Return what torques of a simulation have beside those of the motion through its positions, shape (time, joint) [N m, N].
+    """Difference of a simulation's torques from those of the motion through its positions, shape (time, joint) [N m, N].
 
     MuJoCo steps by v(k+1) = v(k) + h a(k), q(k+1) = q(k) + h v(k+1), so that a(k) is the acceleration at q(k), and v(k) the
     velocity half a step before. Its implicit integrators take forces that depend on velocities at the end of the step, where
@@ -77,7 +77,7 @@ def actuator_damping(robot: Robot) -> Array:
 
 
 def steps_of(robot: Robot) -> dict[str, tuple[float, ...]]:
-    """Return what the integrator makes of each joint that moves by commands, as `identify.servo.law.TimeSteps` has it, by name.
+    """Effect of the integrator on each joint that moves by commands, as `identify.servo.law.TimeSteps` has it, by name.
 
     A symplectic step takes damping D at its end as an inertia h D / 2, at its beginning as -h D / 2, where both are beside the
     mean of the two; and the control that is logged at an instant acts from half a step before (see `torque_of_steps`). Dry
@@ -108,7 +108,7 @@ def _step_times(robot: Robot) -> tuple[float, float, float]:
 
 
 def integrator_name(robot: Robot) -> str:
-    """Return what MuJoCo calls the integrator of a robot's file."""
+    """MuJoCo's name of the integrator of a robot's file."""
     word = mujoco.mjtIntegrator(robot.model.opt.integrator).name.removeprefix("mjINT_")
     return {"EULER": "Euler", "RK4": "RK4"}.get(word, word.lower())
 

@@ -143,7 +143,7 @@ def _tie(model: mujoco.MjModel, equality: int) -> str:
 
 
 def unmodelled(robot: Robot) -> list[str]:
-    """Return what of a robot's file makes torques that no parameter describes."""
+    """Parts of a robot's file whose torques no parameter describes."""
     model = robot.model
     sprung = [robot.joints[j] for j in np.flatnonzero(model.jnt_stiffnesspoly.any(axis=1))]
     found = [f"springs that are not linear at {', '.join(sprung)}"] if sprung else []

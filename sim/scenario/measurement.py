@@ -52,7 +52,7 @@ class TorqueMeasurement:
         return np.hypot(noise, step / np.sqrt(12))
 
     def logged(self, tau: Array, n: int, rngs: Sequence[np.random.Generator]) -> Array:
-        """Return what the log says of the torques `tau` [N m], shape (nsim, time, joint)."""
+        """Logged torques for the torques `tau` [N m], shape (nsim, time, joint)."""
         gain, offset, noise, step = (
             per_joint(getattr(self, name), n, f"torque.{name}") for name in ("gain_error", "offset", "noise", "resolution")
         )
@@ -61,7 +61,7 @@ class TorqueMeasurement:
         return np.where(step > 0, np.rint(measured / np.where(step > 0, step, 1.0)) * step, measured)
 
     def channel(self, delay: float, lag: float, fs: float) -> TorqueChannel:
-        """Return what the log's torque means, when a command acts `delay` [s] after its sample and the torque `lag` later.
+        """Meaning of the log's torque, when a command acts `delay` [s] after its sample and the torque `lag` later.
 
         A measured current is what earlier commands have left when a sample is taken. The last of them had a share
         1 - exp(-(T - r)/tau) of the filter's output, with T = 1/fs, r = delay modulo T and tau its time constant; those

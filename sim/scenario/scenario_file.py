@@ -111,7 +111,7 @@ def from_dict(content: Mapping[str, Any]) -> Scenario:
 
 
 def _besides(error: str, content: Mapping[str, Any]) -> list[str]:
-    """Return what is wrong, but for keys that are there and were taken out because they are wrong themselves."""
+    """Errors, but for keys that were taken out because they are wrong themselves."""
     return [part for part in error.split("; ") if not any(part.startswith(f"key {key!r} is missing") for key in content)]
 
 

@@ -78,7 +78,7 @@ class Fourier(AbstractTrajectory):
         return all((np.abs(x.sum(axis=0)) <= STILL * np.abs(x).sum(axis=0)).all() for x in parts)
 
     def at(self, t: Array) -> tuple[Array, Array, Array]:
-        """Return how far from the middle the joints are at the times `t` [s], and the derivatives, shape (time, joint) each."""
+        """Distance of the joints from the middle at the times `t` [s], and its derivatives, shape (time, joint) each."""
         w = 2 * np.pi * np.arange(1, len(self.sines) + 1) / self.period
         sin, cos = np.sin(w * t[:, None]), np.cos(w * t[:, None])
         a, b = np.array(self.sines), np.array(self.cosines)

@@ -49,7 +49,7 @@ BLOCK = 50  # Draws that are looked at together
 
 
 def _far(points: Array, neighbours: Array, smallest_move: Array | float) -> npt.NDArray[np.bool_]:
-    """Return which joints of points, shape (draw, joint), are far enough from all neighbours, of the same shape."""
+    """Mask of the joints of points, shape (draw, joint), that are far enough from all neighbours, of the same shape."""
     return np.asarray((np.abs(neighbours - points[:, None]) >= smallest_move).all(axis=1))
 
 
@@ -188,7 +188,7 @@ class RandomPace(AbstractTrajectory):
 
 
 def room(robot: Robot) -> Array:
-    """Return where joints move at random, shape (joint, 2): their ranges, or half a turn or metre to either side."""
+    """Ranges of random motion, shape (joint, 2): their ranges, or half a turn or metre to either side."""
     free = np.where(robot.slides, 0.5, np.pi)
     around = robot.model.qpos0[:, None] + free[:, None] * [-1.0, 1.0]
     return np.where(np.isfinite(robot.ranges), robot.ranges, around)

@@ -28,11 +28,11 @@ class AbstractOperator(ABC):
 
     @abstractmethod
     def step(self, fs: float) -> int:
-        """Return how many samples lie between rows (n_d in the paper); raise SettingError if `fs` does not fit."""
+        """Samples between rows (n_d in the paper); raise SettingError if `fs` does not fit."""
 
     @abstractmethod
     def halo(self, fs: float) -> float:
-        """Return how far [s] a row looks to either side of its sample."""
+        """Reach of a row to either side of its sample [s]."""
 
     @abstractmethod
     def response(self, fs: float) -> Array:
@@ -44,7 +44,7 @@ class AbstractOperator(ABC):
 
     @final
     def grid(self, samples: int, fs: float, trim: float) -> Grid:
-        """Return where the rows of a log of `samples` lie, `trim` [s] away from both ends.
+        """Instants of the rows of a log of `samples`, `trim` [s] away from both ends.
 
         Raises
         ------
