@@ -49,7 +49,7 @@ def is_told(error: BaseException) -> bool:
 
 
 def reason(error: BaseException) -> str:
-    """Return what an error says; of a fault its kind, too."""
+    """Message of an error; of a fault its kind, too."""
     if isinstance(error, MemoryError):
         return f"not enough memory{f': {error}' if str(error) else ''}; take a part of the log, or close other programs"
     if isinstance(error, OSError) and not isinstance(error, ExperimentError):

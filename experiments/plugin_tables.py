@@ -34,6 +34,6 @@ TABLES: tuple[Table[Any], ...] = (
 
 
 def plugin_conflicts() -> list[str]:
-    """Return which plug-ins of other packages cannot be used, since their names are taken."""
+    """Plug-ins of other packages that cannot be used, since their names are taken."""
     tables = [table for table in TABLES if isinstance(table, PluginTable)]
     return [f"{table.point} plug-in {conflict}" for table in tables for conflict in table.conflicts]

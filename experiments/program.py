@@ -7,7 +7,7 @@ from pathlib import Path
 
 @cache
 def program() -> str:
-    """Return what to type to run it: environments of a clone lie beside its pyproject.toml."""
+    """Command that runs it: environments of a clone lie beside its pyproject.toml."""
     beside = Path(sys.prefix).parent / "pyproject.toml"
     try:
         cloned = 'name = "idbench"' in beside.read_text(encoding="utf-8")

@@ -111,7 +111,7 @@ WORTHLESS = 999.0  # Percentages from here on all say the same
 
 
 def percent_reach(shares: npt.ArrayLike, most: float = np.inf) -> float:
-    """Return how far an axis goes to either side [%] that shows differences in % of values, of those that are below `most`.
+    """Half width of an axis [%] that shows differences in % of values, of those that are below `most`.
 
     100 % at most, and where nothing is known.
     """
@@ -121,7 +121,7 @@ def percent_reach(shares: npt.ArrayLike, most: float = np.inf) -> float:
 
 
 def of_each(said: Iterable[tuple[str, str]]) -> list[str]:
-    """Return what is said of logs, by their names, a line for what is said of several."""
+    """Notes on logs, by their names, one line for those on several."""
     names: dict[str, list[str]] = {}
     for name, words in said:
         names.setdefault(words, []).append(name)
@@ -240,7 +240,7 @@ def error_percentage(share: float) -> str:
 
 
 def printed(show: Callable[[Console], object], width: int = 160) -> str:
-    """Return what is printed on a console of so many characters."""
+    """Text as printed on a console of so many characters."""
     file = StringIO()
     show(Console(file=file, width=width))
     return file.getvalue()

@@ -43,14 +43,14 @@ def blamed() -> Iterator[None]:
 
 
 def expect_kind(plugin: object, method: str, value: object, kind: type[T]) -> T:
-    """Return what a method of a plug-in returned, if it is of a kind; raise PluginError otherwise."""
+    """Result of a plug-in's method, if it is of a kind; raise PluginError otherwise."""
     if isinstance(value, kind):
         return value
     raise PluginError(f"plug-in {type(plugin).__name__}.{method} returned {value!r:.60}, expected {kind.__name__}")
 
 
 def expect(plugin: object, method: str, value: object, *shapes: Sequence[int]) -> Array:
-    """Return what a method of a plug-in returned, an array of one of the shapes; raise PluginError otherwise."""
+    """Result of a plug-in's method, an array of one of the shapes; raise PluginError otherwise."""
     if isinstance(value, np.ndarray) and value.shape in shapes and value.dtype.kind in "fiub":
         return value
     given = f"an array of {value.dtype}, shape {value.shape}" if isinstance(value, np.ndarray) else f"{value!r:.60}"

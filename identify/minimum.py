@@ -7,7 +7,7 @@ GOLDEN = (3 - sqrt(5)) / 2  # Share of an interval at which a golden section div
 
 
 def minimum(f: Callable[[float], float], low: float, high: float, xtol: float) -> float:
-    """Return where a function of one number is least between two.
+    """Minimum of a function of one number between two.
 
     R. P. Brent, Algorithms for Minimization without Derivatives, Prentice-Hall 1973, chapter 5: through the best three points,
     x, w and v, goes a parabola, whose lowest point is

@@ -108,7 +108,7 @@ class AbstractModel(ABC):
 
     @abstractmethod
     def B(self, state: State) -> Multipliers:
-        """Return what torques are multiplied by, (row of an instant, joint) -> (..., time) or a constant, where it is not 0."""
+        """B, by which torques are multiplied, (row of an instant, joint) -> (..., time) or a constant, where it is not 0."""
 
     @abstractmethod
     def c(self, basis: Basis, state: State) -> Columns:
@@ -199,7 +199,7 @@ class OverWindows(AbstractModel):
     """The model."""
 
     def B(self, state: State) -> Multipliers:
-        """Return what the other model multiplies torques by."""
+        """B of the other model."""
         return self.of.B(state)
 
     def c(self, basis: Basis, state: State) -> Columns:

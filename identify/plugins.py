@@ -221,5 +221,5 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
 
 
 def _places(entries: list[EntryPoint]) -> str:
-    """Return where plug-ins come from: package and object."""
+    """Origin of plug-ins: package and object."""
     return " and ".join(sorted(f"{entry.dist.name if entry.dist else '?'} ({entry.value})" for entry in entries))

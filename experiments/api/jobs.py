@@ -55,7 +55,7 @@ class StudyTable:
         return cls(store.study, rows, cells(rows, store.study.varied, store.study.parameters), store.seconds())
 
     def summary(self) -> dict[str, Any]:
-        """Return what `idbench study` writes into summary.json."""
+        """The summary.json of `idbench study`."""
         return summary_of(self.study, self.cells, dict(self.seconds))
 
     def typical_errors(self) -> dict[tuple[Any, ...], float]:
@@ -131,7 +131,7 @@ def _store(described: Study, out: Path) -> Store:
 
 
 def fit_payload(log: Files, unloaded: Files = (), **keys: Any) -> PayloadFit:
-    """Return what the gripper holds, as `idbench payload` finds it; files of logs, and its options by keyword."""
+    """The payload, as `idbench payload` identifies it; files of logs, and its options by keyword."""
     return payload_of(_asked(jobs.PayloadRequest, "fit_payload", keys, log=log, unloaded=unloaded))
 
 

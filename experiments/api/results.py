@@ -250,7 +250,7 @@ class Identification:
             write_text(Path(path), text, "report", force=force)
 
     def summary(self) -> dict[str, Any]:
-        """Return what `idbench identify` writes into summary.json, but for the names of files."""
+        """The summary.json of `idbench identify`, but for the names of files."""
         return summary_of(self.fit) | self.judgement.summary()
 
     def _of(self, model: str | None) -> Any:

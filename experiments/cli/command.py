@@ -30,7 +30,7 @@ class Command:
 
 
 def command_of(name: str, options: Any, positional: str, left_out: tuple[str, ...], *, absolute: bool = False) -> str:
-    """Return what was asked as a command: all that differs from the defaults, but for fields that are left out.
+    """Command line of a request: all that differs from the defaults, but for fields that are left out.
 
     Parameters
     ----------

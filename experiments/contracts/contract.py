@@ -100,7 +100,7 @@ def require_equal(found: Any, expected: Any, what: str, rtol: float = 0.0, atol:
 
 
 def untouched(function: Callable[..., Array], *arrays: Array) -> Array:
-    """Return what a function gives of read-only arrays; raise ContractError if it is not the same bits twice."""
+    """Result of a function for read-only arrays; raise ContractError if it is not the same bits twice."""
     for array in arrays:
         array.setflags(write=False)
     first, second = function(*arrays), function(*arrays)

@@ -233,19 +233,19 @@ class Design:
         return there, Reference(fs, there.q[::-1], -there.qd[::-1], there.qdd[::-1])
 
     def pace(self, c: Array) -> float:
-        """Return how fast the ways may be: slower where their torques would be too large."""
+        """Speed scale of the ways to and from home: slower where their torques would be too large."""
         for pace in PACES:
             if not any(broken for way in self.ways(c, FS, pace) for broken in self.inspector.look(way).broken()):
                 break
         return pace
 
     def look(self, c: Array) -> LimitUse:
-        """Return how far a motion uses its limits."""
+        """Use of the limits by a motion."""
         return self.inspector.look(self.trajectory(c, 1).motion(self.robot_model.robot).sample(FS))
 
 
 def plan_for(design: Design) -> Plan:
-    """Return what the search minimises; raise ExperimentError if the motion is too short for the parameters."""
+    """Plan that the search minimises; raise ExperimentError if the motion is too short for the parameters."""
     _require_enough(design)
     moves = max(1, round(design.duration * design.frequency))
     if moves > MANY:

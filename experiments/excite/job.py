@@ -43,7 +43,7 @@ def excited(asked: ExciteRequest, progress: Callable[[float], None]) -> tuple[Ex
 
 
 def designed(asked: ExciteRequest) -> Design:
-    """Return what is asked for, checked."""
+    """The checked design."""
     if asked.fs is not None:
         _require_between("fs", asked.fs, 10, FASTEST)
     scenario = _scenario(asked)
@@ -89,7 +89,7 @@ def _require_between(name: str, value: float, least: float, most: float) -> None
 
 
 def _limits(asked: ExciteRequest) -> MotionLimits:
-    """Return what a motion must keep: asked before the file of --limits."""
+    """Limits of a motion: asked ones before the file of --limits."""
     limits = MotionLimits.read(asked.limits)
     for name in ("velocity", "acceleration"):
         values: tuple[float, ...] = getattr(asked, name)
@@ -101,7 +101,7 @@ def _limits(asked: ExciteRequest) -> MotionLimits:
 
 
 def _scenario(asked: ExciteRequest) -> Scenario:
-    """Return what says how noisy the log will be, and how the motion is simulated: asked before the scenario's own."""
+    """Scenario of noise and simulation: asked settings before its own."""
     scenario = load(asked.noise or "ideal")
     bits = asked.encoder_bits if asked.encoder_bits is not None or asked.noise else BITS
     noise = asked.torque_noise or (() if asked.noise else TORQUE_NOISE)

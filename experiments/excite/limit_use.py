@@ -68,7 +68,7 @@ class Inspector:
     """As far as they are known, shape (p,)."""
 
     def look(self, motion: Reference) -> LimitUse:
-        """Return how far a motion, sampled at FS, uses its limits."""
+        """Use of the limits by a motion that is sampled at FS."""
         jerk = np.gradient(motion.qdd, 1 / FS, axis=0)
         rates = {"velocity": motion.qd, "acceleration": motion.qdd, "jerk": jerk}
         shares = {"position": np.abs(motion.q - self.limits.middle) / self.limits.sizes[0]}

@@ -84,7 +84,7 @@ class MotionSequence:
         return self.rounds[-1].excited
 
     def summary(self) -> dict[str, Any]:
-        """Return what summary.json has of it."""
+        """Its part of summary.json."""
         return {"until": self.wished, "reached": self.reached, "rounds": [_summary(each) for each in self.rounds]}
 
 

@@ -68,7 +68,7 @@ class FreeRuns:
         return np.asarray((self.high - self.low)[:, -1].mean(axis=0))
 
     def words(self, joints: tuple[str, ...]) -> str:
-        """Return what to say of it."""
+        """Findings in words."""
         every, worst = float(self.held.mean()), int(self.held.argmin())
         narrower = float(np.median(self.width / np.maximum(self.usual, 1e-12)))
         said = (
@@ -255,7 +255,7 @@ def robot_texts(ensemble: Ensemble, folder: Path) -> dict[Path, str]:
 
 
 def notes(ensemble: Ensemble) -> list[str]:
-    """Return what to say of the robots."""
+    """Remarks on the robots."""
     joints, spread = ensemble.fit.robot_model.robot.joints, ensemble.spread
     wider = f"deviations are {spread:.2f} times the standard errors, as free runs of the fitted logs show"
     wider = wider if ensemble.calibrated else "no free run of the fitted logs was possible: deviations are the standard errors"

@@ -53,7 +53,7 @@ def _marked(text: str, fit: Fit, model: str) -> str:
 
 
 def missing(written: WrittenRobot, letters: Sequence[str], coupled: bool = False) -> str:
-    """Return what parameters of joints, or of coupled drives, make of each joint's torque in the logs; empty if nothing."""
+    """Share of each joint's torque in the logs by parameters of joints, or of coupled drives; empty if there is none."""
     robot_model = written.fit.robot_model
     names = {p.name for p in robot_model.grouping.standard.parameters if p.symbol in letters and bool(p.drive) == coupled}
     joints, shares = robot_model.robot.joints, 100 * written.share_of(names)

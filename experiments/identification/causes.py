@@ -165,7 +165,7 @@ class Cause:
         return f"{self.words}{gain}; {'try ' if self.remedy else ''}{self.mends}"
 
     def summary(self) -> dict[str, Any]:
-        """Return what a summary.json says of it."""
+        """Its part of summary.json."""
         s, joints = self.suspect, self.robot_model.robot.joints
         single = len(s.size) == 1
         return {
@@ -261,7 +261,7 @@ class Cause:
 
 
 def words_of_diagnosis(causes: Sequence[Cause] | None) -> str:
-    """Return what the tests say, in a line."""
+    """Result of the tests, in a line."""
     if causes is None:
         return "mistakes: not tested, the rows are too few or are not kept"
     return (

@@ -54,7 +54,7 @@ def drawn_about(robot_model: RobotModel, estimate: Estimate, deviations: Array) 
 
 
 def _places(robot_model: RobotModel, estimate: Estimate) -> list[int]:
-    """Return where what was identified stands among all that could be."""
+    """Places of the identified parameters among all standard ones."""
     return [robot_model.grouping.basis.places[parameter] for parameter in estimate.problem.basis.parameters]
 
 

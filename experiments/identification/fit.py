@@ -199,7 +199,7 @@ class Fit:
         return {model: one.left_out for model, e in self.estimates.items() for one in e.fits.values() if one.left_out}
 
     def summary(self) -> dict[str, Any]:
-        """Return what a summary.json says of it."""
+        """Its part of summary.json."""
         truth = None if self.truth is None else list(self.truth.values())
         models = {name: summarize(e, truth) for name, e in self.estimates.items()}
         for name, share in self.explained.items():
@@ -239,7 +239,7 @@ class Fit:
         return {"meaning": channel.meaning, "delay": channel.delay, "gain": channel.gain, **more}
 
     def _of_log(self, k: int) -> dict[str, Any]:
-        """Return what a summary.json says of one of the logs."""
+        """Summary of one of the logs."""
         log, name = self.logs.fitted[k], self.logs.names[k] if self.logs.names else ""
         errors = {model: [finite(x) for x in errors[k]] for model, errors in self.torque_errors.items()}
         known = {"name": name, "samples": log.samples, "fs": log.fs, "torque": self._channel(k)}

@@ -120,7 +120,7 @@ def _errors(before: Fit, after: Fit) -> tuple[float, float]:
 
 
 def _with_its_cause(found: Fit, error: IdentificationError) -> IdentificationError:
-    """Return why nothing was estimated, with the residuals of least squares, if they depend on the motion."""
+    """The error, completed by its cause, with the residuals of least squares, if they depend on the motion."""
     if isinstance(error, ExcitationError) or found.solver.filtered:
         return error
     try:

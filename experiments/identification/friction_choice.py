@@ -89,7 +89,7 @@ def chosen_in_turns(request: Request, logs: Logs) -> tuple[Request, Logs, Fricti
 
 
 def words(choice: FrictionChoice, laws: Sequence[Sequence[str]], joints: Sequence[str]) -> list[str]:
-    """Return which laws each joint has, and the share of its squared error on held-out stretches that they explain."""
+    """Laws of each joint, and the share of its squared held-out error that they explain."""
     said = []
     for j, joint in enumerate(joints):
         taken = {score.law: score for score in choice.scores if score.joint == j and score.taken}
@@ -103,7 +103,7 @@ def words(choice: FrictionChoice, laws: Sequence[Sequence[str]], joints: Sequenc
 
 
 def summary(choice: FrictionChoice) -> list[dict[str, Any]]:
-    """Return what a summary.json says of what was compared."""
+    """Summary of the comparison."""
     return [{name: _finite(x) for name, x in (asdict(score) | {"joint": score.joint + 1}).items()} for score in choice.scores]
 
 

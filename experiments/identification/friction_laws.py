@@ -105,7 +105,7 @@ class FrictionLaws:
 
 
 def _twice(first: str, second: str, mark: str) -> str:
-    """Return how to say that two texts give the laws of the same joints, and what may have been meant."""
+    """Message that two texts give the laws of the same joints, with the likely intention."""
     if first == second:
         return f"--friction {first} {second}: the same is given twice: leave one out"
     whose = "that joint" if mark else "all joints"
@@ -175,7 +175,7 @@ def law_of(name: str, option: str = "--friction") -> AbstractBlock:
 
 
 def said(j: int, joints: Sequence[str]) -> str:
-    """Return how an option names a joint: by its number, unless some joint is called like that."""
+    """Name of a joint in an option: by its number, unless some joint is called like that."""
     return joints[j] if str(j + 1) in joints else str(j + 1)
 
 

@@ -47,7 +47,7 @@ def _far_from_least_squares(fit: Fit, model: str, estimate: Estimate) -> Iterato
 
 
 def iterations(fit: Fit) -> dict[str, Any]:
-    """Return what a summary.json says of it."""
+    """Its part of summary.json."""
     every = {model: e for model, e in fit.estimates.items() if e.path}
     return {
         model: {

@@ -39,12 +39,12 @@ def identified(asked: IdentifyRequest) -> Fit:
 
 
 def read_options(asked: LogRequest) -> ReadOptions:
-    """Return how logs are read."""
+    """How logs are read, by the request."""
     return ReadOptions(asked.torque, asked.torque_delay, asked.unwrap, columns=asked.reading)
 
 
 def request_of(asked: IdentifyRequest, robot_model: RobotModel | None = None) -> Request:
-    """Return what is asked for, checked before any log is read; the robot by default that which the folder of a run states."""
+    """The checked request, before any log is read; the robot by default that of the run's folder."""
     if not asked.log and robot_model is None:
         raise ExperimentError("name a log, or several of one fit")
     for path in (*asked.log, *asked.validate):
@@ -111,13 +111,13 @@ def fit_of(request: Request, logs: Logs) -> Fit:
 
 
 def summary_of(made: Fit) -> dict[str, Any]:
-    """Return what a summary.json says of a fit."""
+    """Summary of a fit."""
     chosen = {} if made.choice is None else {"friction": summary(made.choice)}
     return {**chosen, **made.summary(), "iterations": iterations(made), "notes": list(notes_of(made))}
 
 
 def notes_of(made: Fit) -> tuple[str, ...]:
-    """Return what was read, done and assumed, and which laws of friction were chosen."""
+    """Notes on reading and assumptions, and the chosen laws of friction."""
     robot_model, choice = made.robot_model, made.choice
     laws = () if choice is None else words(choice, robot_model.laws.names, robot_model.robot.joints)
     return (*made.logs.notes, *(f"the robot's file has {note}" for note in robot_model.robot.notes), *laws)

@@ -31,7 +31,7 @@ class Known:
 
     @classmethod
     def of(cls, words: tuple[str, ...]) -> Self:
-        """Return what words such as links=file, Ia3=0.1 or Fs2=file state.
+        """Known parameters from words such as links=file, Ia3=0.1 or Fs2=file.
 
         Raises
         ------
@@ -105,7 +105,7 @@ class RoughlyKnown:
 
     @classmethod
     def of(cls, words: tuple[str, ...]) -> Self:
-        """Return what words such as file, file:25%, Ia=0.1:30% or Fs2=file:0.02 state.
+        """Roughly known parameters from words such as file, file:25%, Ia=0.1:30% or Fs2=file:0.02.
 
         Raises
         ------
@@ -135,7 +135,7 @@ class RoughlyKnown:
         return cls(links, share, values)
 
     def prior(self, grouping: BaseParameters, basis: Basis, filed: Mapping[str, float], share: float | None) -> AbstractPrior:
-        """Return what that says of the parameters of a basis.
+        """Prior of the parameters of a basis.
 
         Raises
         ------
@@ -186,7 +186,7 @@ def _require_sigma(name: str, sigma: float) -> None:
 
 
 def _grouped(grouping: BaseParameters, names: Sequence[str]) -> str:
-    """Return what parameters are grouped with others in."""
+    """Base parameters in which parameters are grouped with others."""
     made = [f"{base} = {text}" for base, text in grouping.groupings.items() if any(name in text.split() for name in names)]
     return f"no base parameter is made of {', '.join(names)} alone ({'; '.join(made[:3]) or 'they move nothing'})"
 

@@ -43,7 +43,7 @@ class SimulatedLogs:
 
     @classmethod
     def of(cls, every: Sequence[ReadLog], request: Request) -> "SimulatedLogs | None":
-        """Return how the torques of logs are read, if that is stated or evident; None if they are no simulation's."""
+        """Reading of a simulation's torques, if stated or evident; None otherwise."""
         robot_model, stated = request.robot_model, any(read.simulated for read in every)
         inertia = apparent_rotor_inertia(robot_model.robot)
         found = cls(robot_model, inertia)
@@ -89,7 +89,7 @@ class SimulatedLogs:
         return bool(np.quantile(share, 0.25) <= EVIDENT and np.median(share) <= HALF and share.max() <= 1)
 
     def _left(self, logs: Sequence[MotionLog], request: Request) -> Array:
-        """Return what the file's parameters leave of the torques, shape (joint,)."""
+        """Residual torque of the file's parameters, shape (joint,)."""
         plain, chain = self.robot_model.plain, request.processing
         filed = np.array(list(plain.truth(self.robot_model.robot).values()))
         each = (instants(chain.signals(log), plain.basis, ExplicitModel(), chain, filed).in_rows(chain) for log in logs)

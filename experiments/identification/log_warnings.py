@@ -76,7 +76,7 @@ STILL = 1e-3  # A joint that travels less than this share of what the busiest do
 
 
 def warnings_of_log(log: MotionLog, tree: KinematicTree) -> list[str]:
-    """Return what is suspicious about a log: jumps, degrees, millimetres, places that a joint cannot reach, joints at rest."""
+    """Suspicions about a log: jumps, degrees, millimetres, places that a joint cannot reach, joints at rest."""
     found = list(_of_jumps(log, tree))
     jumping = {jump.joint for jump in _jumps(log)}
     by_reason = dict[str, list[str]]()
@@ -91,7 +91,7 @@ def warnings_of_log(log: MotionLog, tree: KinematicTree) -> list[str]:
 
 
 def unchanging(log: MotionLog, tree: KinematicTree) -> list[str]:
-    """Return which torques never change: nobody drives the joint, or its torque was not logged, as rows of a fit show."""
+    """Torques that never change: nobody drives the joint, or its torque was not logged, as rows of a fit show."""
     dead = ", ".join(tree.joints[j].name for j in log.unchanging)
     return [f"the torque of {dead} never changes: is it logged?"] if dead else []
 

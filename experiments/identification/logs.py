@@ -80,7 +80,7 @@ class LogFacts:
             yield f"{', '.join(still)} never moves"
 
     def summary(self) -> dict[str, Any]:
-        """Return what --json says."""
+        """Content of --json."""
         clock = self.repaired.clock
         return {
             "fs": self.log.fs,
@@ -102,7 +102,7 @@ DELAYS: Mapping[str, Callable[[Sequence[MotionLog], Basis, Chain], DelayEstimate
 
 
 def delay_method(delay: str | None) -> str | None:
-    """Return which delay is to be found, of `DELAYS`, if one is."""
+    """Kind of the delay that is sought, of `DELAYS`, if any."""
     return delay if delay in DELAYS else None
 
 
@@ -174,7 +174,7 @@ class Logs:
         return self.name(self.longest) if len(self.fitted) > 1 else "the log"
 
     def name(self, k: int) -> str:
-        """Return what to call one of the fitted logs."""
+        """Name of one of the fitted logs."""
         return self.names[k] if self.names else f"log {k + 1}" if len(self.fitted) > 1 else "the log"
 
     @property

@@ -43,7 +43,7 @@ def file_of(log: Path) -> Path:
 
 
 def stated_by(log: Path) -> dict[str, Any]:
-    """Return what the summary of a results folder says of its run: robot, parameters, truth; nothing of a file."""
+    """Statements of a results folder's summary about its run: robot, parameters, truth; nothing of a file."""
     path = log / "summary.json"
     if not path.is_file():
         return {}
@@ -152,7 +152,7 @@ def _ordered(path: Path, columns: LogColumns, robot_model: RobotModel | None) ->
 
 
 def _meaning(path: Path, options: ReadOptions, stated: TorqueChannel | None) -> Meaning:
-    """Return what the torque of a log means; raise ExperimentError if nobody says it."""
+    """Meaning of a log's torque; raise ExperimentError if nobody states it."""
     if options.columns.simulated and options.torque not in (None, "instantaneous"):
         raise ExperimentError(
             f"--simulated --torque {options.torque}: torques of MuJoCo are instantaneous, beside the positions about which it "
@@ -247,7 +247,7 @@ def columns_of(path: Path, options: ColumnOptions) -> LogColumns:
 
 
 def _joints_of(columns: LogColumns, robot_model: RobotModel) -> str:
-    """Return how to say which joints a log has, where they are fewer than the robot's."""
+    """Hint how to state the joints of a log, where they are fewer than the robot's."""
     known = robot_model.robot.joints
     if columns.n >= len(known):
         return ""

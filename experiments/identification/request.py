@@ -132,7 +132,7 @@ class Request:
             return settled(Problem(tuple(logs), basis, ExplicitModel(), self.processing, simulation, prior))
 
     def _prior(self, basis: Basis, logs: tuple[MotionLog, ...]) -> AbstractPrior | None:
-        """Return what is known before: of smooth functions their sizes, of others what is said."""
+        """Prior of the parameters: of smooth functions by their sizes, of others as stated."""
         known = self.robot_model.prior(self.share)
         if not places_of(basis)[0]:
             return known
@@ -140,7 +140,7 @@ class Request:
         return functions if known is None else PriorSum((functions, known))
 
     def _simulation(self, logs: tuple[MotionLog, ...]) -> Simulation:
-        """Return how the robot is simulated, for estimators that need it."""
+        """Simulation of the robot, for estimators that need it."""
         needs, robot_model = self.solver.needs, self.robot_model
         start = None if self.start == "least-squares" else np.array(list(robot_model.truth(robot_model.robot).values()))
         loop = ScenarioLoop.of(robot_model, self.loops, logs) if "loop" in needs and self.loops else None

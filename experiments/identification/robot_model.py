@@ -78,7 +78,7 @@ class RobotModel:
         return bool(self.asked.prior) and self.roughly_known.links and self.roughly_known.share is None
 
     def prior(self, share: float | None = None) -> AbstractPrior | None:
-        """Return what is roughly known of the parameters, links to a `share` of the file's; None if nothing is."""
+        """Prior of the parameters, links to a `share` of the file's; None if there is none."""
         if not self.asked.prior:
             return None
         return self.roughly_known.prior(self.grouping, self.basis, standard_parameters(self.robot), share)
@@ -191,7 +191,7 @@ class RobotModel:
         return {**self._unasked(), **self.held, **values, **tied}
 
     def _unasked(self) -> dict[str, float]:
-        """Return what the robot's file may have and the identification says is zero: rotors, laws of friction."""
+        """Zeros of what the identification leaves out and the robot's file may have: rotors, laws of friction."""
         found = {named("Ia", j): 0.0 for j in range(self.robot.n)} if self.asked.armature == "none" else {}
         for letters, law in (("Fv", "viscous"), ("Fs", "coulomb")):
             found |= {named(letters, j): 0.0 for j, own in enumerate(self.laws.names) if law not in own}

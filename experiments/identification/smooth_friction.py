@@ -22,7 +22,7 @@ def places_of(basis: Basis) -> tuple[list[int], list[int]]:
 
 
 def prior_of(basis: Basis, sizes: tuple[float, ...]) -> NormalPrior:
-    """Return what is known of the functions: they are near zero."""
+    """Prior of the functions: they are near zero."""
     places, joints = places_of(basis)
     eye = np.eye(len(basis.parameters))[:, places]
     return NormalPrior.of(eye, np.zeros(len(places)), np.array(sizes)[joints])

@@ -108,7 +108,7 @@ class Verdict:
             yield "noise and sigma explain all of it"
 
     def summary(self) -> dict[str, Any]:
-        """Return what a summary.json says of it."""
+        """Its part of summary.json."""
         apart = [f"not simulated: {self.unsimulated}"] if self.unsimulated else []
         return {"verdict": self.word, "reasons": [*self.reasons, *apart]}
 
@@ -252,7 +252,7 @@ class HeldOut:
         return None if isinstance(simulated, str) else np.sqrt(np.mean((self._replayed[0].q - simulated.q) ** 2, axis=0))
 
     def summary(self) -> dict[str, Any]:
-        """Return what a summary.json says of it."""
+        """Its part of summary.json."""
         return {
             "on": self.title,
             "models": {model: {**self.verdicts[model].summary(), **self._of(model)} for model in self.torques},

@@ -21,7 +21,7 @@ class Unjudged:
     """Of a fault of idbench."""
 
     def summary(self) -> dict[str, Any]:
-        """Return what a summary.json says of it."""
+        """Its part of summary.json."""
         return {"on": self.title, "models": {}, "failure": self.why}
 
 
@@ -55,7 +55,7 @@ class Judgement:
         return self.hardest is not None and WORDS[_place(self.hardest)] == "good"
 
     def summary(self) -> dict[str, Any]:
-        """Return what a summary.json says of it, beside the fit's own."""
+        """Its part of summary.json, beside the fit's own."""
         each = [one.summary() for one in self.on]
         return {"validation": each[0], "validations": each}
 

@@ -39,7 +39,7 @@ MODEL = "the model"  # Subjects of warnings, in the order in which to check them
 
 
 def warnings_of_result(fit: Fit) -> dict[str, list[str]]:
-    """Return what no healthy identification shows, and what the log leaves open, by what it is about."""
+    """Symptoms of a bad identification, and parameters that the log leaves open, by subject."""
     log = [*wrong_sign(fit), *unlike_file(fit), *_seems_simulated(fit)]
     motion = list[str]()
     model = list[str]()
@@ -167,7 +167,7 @@ def _share(share: float) -> str:
 
 
 def hidden_notes(fit: Fit) -> list[str]:
-    """Return which parameters the logs do not show, and what would show them."""
+    """Parameters that the logs do not show, and motions that would."""
     if not fit.hidden:
         return []
     robot, absent = fit.robot_model, never_logged(fit.logs.fitted)
@@ -182,19 +182,19 @@ def hidden_notes(fit: Fit) -> list[str]:
 
 
 def warnings_of_robot(robot: Robot) -> list[str]:
-    """Return what of a robot's file no parameter describes, and what was mended in it."""
+    """Parts of a robot's file that no parameter describes, and repairs of it."""
     return [*undescribed(robot), *(f"the file of robot {robot.name!r} has {note}" for note in robot.notes)]
 
 
 def undescribed(robot: Robot) -> list[str]:
-    """Return what of a robot's file no parameter describes."""
+    """Parts of a robot's file that no parameter describes."""
     found = unmodelled(robot)
     messages = [f"the file of robot {robot.name!r} has {', '.join(found)}, which no parameter describes"] if found else []
     return [*messages, *warnings_of_base(kinematic_tree(robot))]
 
 
 def wrong_sign(fit: Fit) -> list[Note]:
-    """Return which torques have the wrong sign: those that drive their joint by friction."""
+    """Torques with the wrong sign: those whose friction drives their joint."""
     model, estimate = next(iter(fit.estimates.items()))
     values = zip(fit.basis.parameters, estimate.X, estimate.own_sigma, strict=True)
     known = {(p.kind, p.joint): (x, sigma) for p, x, sigma in values}
@@ -225,7 +225,7 @@ def _work(log: MotionLog) -> float:
 
 
 def _poorly_known(fit: Fit) -> list[str]:
-    """Return which base parameters the log leaves open so far that a brisk motion shows it, and the moves to make.
+    """Base parameters that the log leaves open by more than a brisk motion shows, and the moves to make.
 
     By the part of sigma due to noise: another motion does not mend the model.
     """
@@ -240,7 +240,7 @@ def _poorly_known(fit: Fit) -> list[str]:
 
 
 def helpful_moves(robot_model: RobotModel, log: MotionLog, names: Sequence[str]) -> str:
-    """Return what would show parameters that a log hides: joints that never move, or else moves; empty if that is not known."""
+    """Moves that would show hidden parameters; empty if unknown."""
     if still := resting(log, robot_model.tree):
         return f"{', '.join(still)} never moves in this log: move it"
     return _moves(robot_model, names)

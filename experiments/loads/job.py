@@ -46,7 +46,7 @@ class PayloadFit:
     """What was read, done and assumed."""
 
     def summary(self) -> dict[str, Any]:
-        """Return what `idbench payload` writes into summary.json, but for the names of files."""
+        """The summary.json of `idbench payload`, but for the names of files."""
         doubts = self.judgement.warnings(self.leading)
         judged = {"judgement": self.judgement.summary(self.judgement.word(doubts))}
         return {"robot": self.judgement.request.robot_model.name, **payload_summary(self.found), **judged}
@@ -75,7 +75,7 @@ class GainsFit:
     """What was read, done and assumed."""
 
     def summary(self) -> dict[str, Any]:
-        """Return what `idbench gains` writes into summary.json, but for the names of files."""
+        """The summary.json of `idbench gains`, but for the names of files."""
         robot_model = self.judgement.request.robot_model
         judged = {"judgement": self.judgement.summary(self.judgement.word(self.judgement.warnings(None)))}
         found = gains_summary(self.found, self.given.tolist(), robot_model.robot.joints)
@@ -92,7 +92,7 @@ class GainsFit:
 
 
 def payload_of(asked: PayloadRequest) -> PayloadFit:
-    """Return what the gripper holds.
+    """The payload in the gripper.
 
     Raises
     ------

@@ -127,12 +127,12 @@ class LoadJudgement:
         return "poor" if doubts[PAYLOAD] else max((verdict.word for verdict in self.verdicts.values()), key=WORDS.index)
 
     def warnings(self, payload: PayloadEstimate | None) -> dict[str, list[str]]:
-        """Return what to check, by what it is about."""
+        """Warnings by subject."""
         of_payload_ = [*self._of_stated(), *(_of_body(payload, self.names[len(self.robot.without) :]) if payload else ())]
         return {LOG: list(self._of_logs()), PAYLOAD: of_payload_, MODEL: list(self._of_fit())}
 
     def summary(self, word: str) -> dict[str, Any]:
-        """Return what a summary.json says of it."""
+        """Its part of summary.json."""
         return {"verdict": word, "logs": {name: verdict.summary() for name, verdict in self.verdicts.items()}}
 
     def _of_logs(self) -> Iterator[str]:

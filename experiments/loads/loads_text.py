@@ -77,7 +77,7 @@ def body_of(payload: PayloadEstimate) -> dict[str, Any]:
 
 
 def payload_summary(found: Mapping[str, PayloadEstimate | str]) -> dict[str, Any]:
-    """Return what a summary.json says of a payload."""
+    """Summary of a payload."""
     ways = {way: payload for way, payload in found.items() if isinstance(payload, PayloadEstimate)}
     leading = next(iter(ways.values()))
     return {
@@ -115,7 +115,7 @@ def print_gains(console: Console, found: GainEstimate, given: Sequence[float], j
 
 
 def gains_summary(found: GainEstimate, given: Sequence[float], joints: Sequence[str]) -> dict[str, Any]:
-    """Return what a summary.json says of gains; those that the payload says nothing of are null."""
+    """Summary of gains; those that the payload says nothing of are null."""
     return {
         "joints": list(joints),
         "read_with": list(map(float, given)),

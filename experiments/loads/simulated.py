@@ -111,7 +111,7 @@ class Pairs:
         return LoadedRobot(self.robot_model.tree, self.robot_model.grouping.standard, first, second, known=known)
 
     def payloads(self, told: Told) -> dict[str, PairScore]:
-        """Return how well each way finds the payload."""
+        """Accuracy of each way for the payload."""
         found, ways = dict[str, PairScore](), list(WAYS)
         for way, identify in WAYS.items():
             one = partial(self._payload, identify)
@@ -119,7 +119,7 @@ class Pairs:
         return found
 
     def gains(self, known: Mapping[str, float], told: Told) -> PairScore:
-        """Return how well gains that are drawn for each run are found, with what is known of the payload."""
+        """Accuracy of gains that are drawn for each run, given the known payload."""
         rng, n = np.random.default_rng(self.scenario.seed), self.robot_model.tree.n
         true = rng.uniform(*GAINS, (self.runs, n))
 

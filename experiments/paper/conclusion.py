@@ -15,7 +15,7 @@ def known_ratios() -> list[RatioRow]:
 
 
 def conclusion_lines() -> list[str]:
-    """Return what the paper's tables end with: the conclusion, and the command that computes it."""
+    """Conclusion below the paper's tables, and the command that computes it."""
     found = known_ratios()
     of = f"{min(row['runs'] for row in found)} motions or more; {program()} study models --seeds 200"
     return [f"The paper's conclusion, with 95 % confidence intervals ({of}): {conclusion(found)}"]

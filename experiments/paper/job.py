@@ -120,7 +120,7 @@ class TrajectorySearch:
         return best, distance
 
     def excess(self, robot: Robot, scenario: Scenario) -> float:
-        """Return by how much a motion exceeds the limits of speed and torque, as a share; 0 or less if it keeps them."""
+        """Excess of a motion over the limits of speed and torque, as a share; 0 or less if it keeps them."""
         torque = np.abs(ideal_log(robot, scenario.quintic().points.sample(self.fs)).tau).max(axis=0)
         used = np.concatenate([scenario.quintic().points.peak_velocity / self.velocity, torque / robot.torque_limits])
         return float(used.max() - 1)

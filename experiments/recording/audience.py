@@ -57,7 +57,7 @@ class Watching:
             raise ExperimentError(f"{ways[0]} and --no-rerun contradict each other: give one")
 
     def hint(self, out: Path) -> str:
-        """Return how to see what was written to `out`."""
+        """Hint how to view results in `out`."""
         return f"; see it: {program()} view {out}" if self.rerun else ""
 
     @contextmanager

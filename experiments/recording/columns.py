@@ -18,7 +18,7 @@ SHOWN, POSES = 62.5, 31.25
 
 
 def shown(first: int, count: int, fs: float, most: float = SHOWN) -> np.typing.NDArray[np.bool_]:
-    """Return which of `count` samples from number `first` on are recorded, at a sampling frequency `fs` [Hz]."""
+    """Recorded samples among `count` from number `first` on, at a sampling frequency `fs` [Hz]."""
     return (first + np.arange(count)) % max(1, int(fs / most)) == 0
 
 
@@ -89,7 +89,7 @@ class ValueColumn(rr.ComponentColumn):
         self._array: pa.Array[Any] = pa.ListArray.from_arrays(_offsets(len(items), count), items)
 
     def component_descriptor(self) -> rr.ComponentDescriptor:
-        """Return which component it is."""
+        """Descriptor of the component."""
         return self.descriptor
 
     def as_arrow_array(self) -> "pa.Array[Any]":

@@ -83,7 +83,7 @@ def named_runs(folders: Sequence[Path]) -> list[Compared]:
 
 
 def shift_of(first: MotionLog, other: MotionLog) -> float | None:
-    """Return by how much `other` is to be moved in time to lie over `first` [s]; None if they do not move alike."""
+    """Time shift that puts `other` over `first` [s]; None if they do not move alike."""
     fs = min(first.fs, other.fs)
     v = [np.gradient(np.stack([np.interp(np.arange(0, log.t[-1], 1 / fs), log.t, q) for q in log.q.T]), axis=1) * fs
          for log in (first, other)]  # fmt: skip
@@ -97,7 +97,7 @@ def shift_of(first: MotionLog, other: MotionLog) -> float | None:
 
 
 def differences(runs: Sequence[Compared]) -> str:
-    """Return which settings differ, as a markdown table."""
+    """Settings that differ, as a markdown table."""
     every = [run.settings for run in runs]
     keys = dict.fromkeys(key for settings in every for key in settings)
     differing = [key for key in keys if len({json.dumps(s.get(key), sort_keys=True) for s in every}) > 1]

@@ -175,7 +175,7 @@ def _chunks(path: Path) -> Iterator[Chunk]:
 
 
 def _place(path: str, name: str, number: int, several: bool) -> str | None:
-    """Return where an entity of a run goes; None if it is left out."""
+    """New path of a run's entity; None if it is left out."""
     head, *rest = path.split("/")
     if head == SIZES:
         of = _place("/".join(rest[1:]), name, number, several)

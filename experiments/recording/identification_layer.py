@@ -199,7 +199,7 @@ class Layer:
 
 
 def row_names(form: str, kinds: int, joints: Sequence[str]) -> Sequence[str]:
-    """Return what the kinds of row of a model are called: after their joint, or after the model if theirs is another unit."""
+    """Names of the kinds of row of a model: after their joint, or after the model if theirs is another unit."""
     if form not in UNITS:
         return joints if kinds == len(joints) else [form] * kinds
     return [form] if kinds == 1 else [f"{form} {joint}" for joint in joints]

@@ -64,7 +64,7 @@ DRAWN = {
 
 
 def about(name: str, origin: str, roles: Sequence[str]) -> str:
-    """Return what a recording shows, with the arms of these roles."""
+    """Content of a recording, with the arms of these roles."""
     first = "where its encoders see it" if roles[0] == "measured" else DRAWN[roles[0]]
     arms = ", ".join([f"The arm is solid {first}", *(DRAWN[role] for role in roles[1:])])
     kinds = "Planned or asked for: broad and light. Measured or logged: thin and light. True: in the joint's own colour."
@@ -103,7 +103,7 @@ class Lanes:
 
 
 def joint_states(qd: Array, slow: float, limited: Array | None, before: float) -> npt.NDArray[np.str_]:
-    """Return what a joint does: it moves, reverses or rests, or its drive is at a limit, whatever it does.
+    """State of a joint: it moves, reverses or rests, or its drive is at a limit, whatever it does.
 
     Parameters
     ----------

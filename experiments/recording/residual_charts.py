@@ -88,7 +88,7 @@ def _parts(fit: Fit) -> Iterator[tuple[str, npt.NDArray[np.intp]]]:
 
 
 def _reference(fit: Fit) -> Array:
-    """Return what estimates are compared with: the truth, or the first of them."""
+    """Reference of the estimates: the truth, or the first of them."""
     return np.array(list(fit.truth.values())) if fit.truth else next(iter(fit.estimates.values())).X
 
 

@@ -34,7 +34,7 @@ MASK_STATES = "green: used, amber: partly, red: masked"
 
 
 def overview(shelf: Shelf) -> Part:
-    """Return where to begin: the arm, the motion, torques measured and predicted, residuals, parameters."""
+    """First view: the arm, the motion, torques measured and predicted, residuals, parameters."""
     rows, states = _rows(shelf), lanes(shelf, JOINT_STATES, "state/*")
     motion = column(
         plot(shelf, "q [rad]", "q/planned", "q/true") or plot(shelf, "q [rad]", "q/measured"),
@@ -90,7 +90,7 @@ def _frictions(shelf: Shelf, joint: str, method: str) -> list[Part]:
 
 
 def drive(shelf: Shelf) -> Part:
-    """Return what the drives were asked for and did, at every sample and inside the loop."""
+    """View of the drives' commands and responses, at every sample and inside the loop."""
     if not shelf.of("drive/*"):
         return None
     samples = column(
@@ -179,7 +179,7 @@ def _in_grid(name: str, parts: Sequence[Part]) -> Part:
 
 
 def _estimates(shelf: Shelf, names: Sequence[str]) -> Part:
-    """Return how estimates come about, those of many parameters in a tab for each joint."""
+    """Views of the iterations, of many parameters in a tab for each joint."""
     if len(names) <= ESTIMATES:
         return grid("estimates", [_estimate(shelf, name) for name in names], 2)
     by_joint: dict[int, list[str]] = {}
@@ -246,7 +246,7 @@ def _number(name: str) -> int:
 
 
 def _order(name: str) -> tuple[int, int]:
-    """Return what parameters are sorted by: their joint, and then inertias, first moments, rotor and friction."""
+    """Sort key of parameters: their joint, and then inertias, first moments, rotor and friction."""
     letters = list(_known_units())
     return _number(name), letters.index(_letters(name)) if _letters(name) in letters else len(letters)
 

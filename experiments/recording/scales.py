@@ -28,12 +28,12 @@ class AbstractScale(ABC):
     """Its upper end."""
 
     def at(self, x: npt.ArrayLike) -> Array:
-        """Return where values lie, 0 at the low end and 1 at the high one; what is beyond an end lies there."""
+        """Places of values, 0 at the low end and 1 at the high one, clipped."""
         low, high = self._bent(np.array([self.low, self.high]))
         return np.clip((self._bent(np.asarray(x, dtype=np.float64)) - low) / ((high - low) or 1.0), 0.0, 1.0)
 
     def holds(self, x: npt.ArrayLike) -> npt.NDArray[np.bool_]:
-        """Return which values lie between the ends."""
+        """Values between the ends."""
         low, high = sorted((self.low, self.high))
         return (np.asarray(x) >= low) & (np.asarray(x) <= high)
 

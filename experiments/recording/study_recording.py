@@ -106,7 +106,7 @@ class AxisCharts:
         return SYMBOLS[self._ways.index(way) % len(SYMBOLS)]
 
     def _place(self, cell: Cell) -> float:
-        """Return where a cell lies on the axis: models and ways beside each other, at the value."""
+        """Place of a cell on the axis: models and ways beside each other, at the value."""
         places = len(self._models) * len(self._ways)
         mine = self._models.index(cell.names[2]) * len(self._ways) + self._ways.index(cell.names[:2])
         values = [self.axis.label(v) for v in self.axis.points]

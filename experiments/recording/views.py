@@ -38,7 +38,7 @@ class Shelf:
                 self._ending.setdefault((len(parts), end), []).append((path, parts))
 
     def _place(self, path: str) -> list[str]:
-        """Return what paths are sorted by: their names, but joints by their order in the robot."""
+        """Sort key of paths: their names, but joints by their order in the robot."""
         rank = {joint: f"{number:03}" for number, joint in enumerate(self.joints)}
         return [rank.get(part, part) for part in path.split("/")]
 
@@ -52,7 +52,7 @@ class Shelf:
         return [path for path, parts in same if all(parts[at] == part for at, part in fixed)]
 
     def rms(self, paths: Iterable[str]) -> str:
-        """Return what a title says of the size of curves: the viewer's axes may have no number but 0."""
+        """Size of curves for a title: the viewer's axes may have no number but 0."""
         known = [size for path in paths for size in self.sizes.get(path, ())]
         if not known:
             return ""
@@ -60,7 +60,7 @@ class Shelf:
         return f", rms {high}" if low == high else f", largest rms {high}"
 
     def parents(self, pattern: str) -> list[str]:
-        """Return what the parts before the last of the matching entities are, each once."""
+        """Parents of the matching entities, each once."""
         return list(dict.fromkeys(path.split("/")[-2] for path in self.of(pattern)))
 
     @property
@@ -69,7 +69,7 @@ class Shelf:
         return list(dict.fromkeys(path.split("/")[1] for path in self.of("identify/*/report")))
 
     def last(self, pattern: str) -> list[str]:
-        """Return what the last parts of the matching entities are, each once."""
+        """Last parts of the matching entities, each once."""
         return list(dict.fromkeys(path.rsplit("/", 1)[-1] for path in self.of(pattern)))
 
 
@@ -133,7 +133,7 @@ def keys(shelf: Shelf, *patterns: str) -> Part:
 
 
 def height(shelf: Shelf, *patterns: str) -> int:
-    """Return how many rows legends take."""
+    """Number of rows that legends take."""
     return -(-len(shelf.of(*patterns)) // ACROSS)
 
 

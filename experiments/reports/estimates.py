@@ -139,14 +139,14 @@ def models_apart(fit: Fit) -> tuple[str, ...]:
 
 
 def _sigmas_apart(fit: Fit, model: str, other: str) -> float:
-    """Return by how many sigma the estimates of two models differ at most; infinity where one is not known."""
+    """Largest difference between the estimates of two models [sigma]; infinity where one is not known."""
     one, two = fit.estimates[model], fit.estimates[other]
     sigma = np.maximum(np.hypot(one.standard_errors, two.standard_errors), 1e-300)
     return float(np.max(np.nan_to_num(np.abs(one.X - two.X) / sigma, nan=np.inf)))
 
 
 def explained(share: Array) -> str:
-    """Return which shares of the torques, shape (joint,), a model explains, in words."""
+    """Explained shares of the torques, shape (joint,), in words."""
     known = 100 * share[np.isfinite(share)]
     each = [f"{max(x, 0):.3f}" for x in (known.min(), known.max())] if known.size else []
     return f"{' to '.join(dict.fromkeys(each))} %" if each else "nothing"
@@ -188,7 +188,7 @@ def _found(judgement: Judgement, causes: Sequence[Cause]) -> str:
 
 
 def _next(judgement: Judgement, of_log: str, first: str) -> str:
-    """Return what to do: about the log, then what mends the first mistake and was proved to, else the first doubt."""
+    """Next step: about the log, then the proved remedy of the first mistake, else the first doubt."""
     if of_log:
         return f"next: {of_log}"
     for cause in judgement.fit.diagnosis or ():

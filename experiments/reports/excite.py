@@ -30,7 +30,7 @@ def print_excited(console: Console, found: Excited) -> None:
 
 
 def lines(found: Excited) -> list[str]:
-    """Return what is to be said of a motion beside its tables."""
+    """Lines on a motion beside its tables."""
     median, best = found.ratios
     count = f"{len(found.random)} random motions of equal length and limits"
     told = []
@@ -189,7 +189,7 @@ def _motion_figure(found: Excited) -> str:
 
 
 def _told_figure(found: Excited) -> str:
-    """Return which stretch of the motion tells how much of which parameter."""
+    """Picture of the information of each stretch of the motion about each parameter."""
     names, shares = found.design.robot_model.basis.names, 100 * found.shares
     figure = Figure(figsize=(11, 0.13 * len(names) + 1.1), layout="constrained")
     panel = figure.subplots()

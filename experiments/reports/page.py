@@ -81,7 +81,7 @@ def parameter_rows(fit: Fit) -> Iterator[ParameterRow]:
 
 
 def interval_reach(fit: Fit) -> float:
-    """Return how far the axis of the intervals goes to either side [% of the values]."""
+    """Half width of the intervals' axis [% of the values]."""
     lead = fit.estimates[fit.leading]
     return percent_reach(100 * SIGMAS * lead.standard_errors / np.maximum(np.abs(lead.X), TINY), 100 * SIGMAS * WEAK)
 

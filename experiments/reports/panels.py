@@ -37,7 +37,7 @@ class PanelAxis:
     """Numbers or names on it; round numbers by default."""
 
     def scaled(self, x: Array) -> Array:
-        """Return where values stand on an even axis."""
+        """Places of values on an even axis."""
         if self.linear:
             return np.asarray(np.sign(x) * np.log10(1 + np.abs(x) / self.linear))
         return np.log10(np.maximum(x, 1e-300)) if self.log else np.asarray(x, dtype=np.float64)
@@ -55,7 +55,7 @@ class PanelAxis:
         return (low, high) if self.log else (low - room, high + room)
 
     def numbers(self, low: float, high: float) -> dict[float, str]:
-        """Return what stands beside it."""
+        """Ticks and their texts."""
         if self.ticks is not None:
             return {x: text for x, text in self.ticks.items() if low <= x <= high}
         if self.log:

@@ -93,7 +93,7 @@ def _beside(heads: list[str], rows: list[list[str]], width: int) -> Table:
 
 
 def _style(cells: Sequence[str]) -> str:
-    """Return how a parameter is written: what must be positive and is not, or is far off, in red; below one sigma in grey."""
+    """Style of a parameter: red if impossible or far off, grey below one sigma."""
     if any(cell.endswith(("!", "*")) for cell in cells):
         return "red"
     share = cells[-1].rstrip("? ")

@@ -76,7 +76,7 @@ def _details_of(one: HeldOut, standing: Array) -> Iterator[str]:
 
 
 def _interval_words(one: HeldOut, model: str, inside: Array, outside: float) -> str:
-    """Return how many of a held-out log's torques lie in the fit's intervals, and how much of its motion outside of the fit."""
+    """Share of held-out torques within the fit's intervals, and share of the motion outside of the fit, in words."""
     interval, joints = one.fit.torque_intervals[model], one.fit.robot_model.robot.joints
     assert interval is not None
     half = " ".join(f"{x:.2g}" if isfinite(x) else "-" for x in interval.half)

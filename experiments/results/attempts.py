@@ -66,7 +66,7 @@ class Attempts:
             sys.stderr.write(f"\nidbench: {self._kept}\n")
 
     def attempt(self, what: str, make: Callable[[], T]) -> T | None:
-        """Return what `make` returns, None if it fails."""
+        """Result of `make`, None if it fails."""
         try:
             return make()
         except BaseException as error:

@@ -229,7 +229,7 @@ class ResultsFolder:
 
 
 def _summarized(folder: Path) -> str:
-    """Return what the summary of a folder says of its experiment, to be named before its files."""
+    """Experiment of a folder by its summary."""
     try:
         found = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["experiment"]
     except (OSError, ValueError, KeyError, TypeError, RecursionError):

@@ -240,6 +240,6 @@ class Manifest:
 
 
 def digest(path: Path) -> str:
-    """Return what tells the content of a file from others."""
+    """Digest of a file's content."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()

@@ -23,7 +23,7 @@ BENCH = "pendulum"  # Robot to whose joint a servo is written where none is name
 def described(
     name: str, source: str, known: Mapping[str, Any], units: Sequence[ServoFit], held_out_error: float
 ) -> dict[str, Any]:
-    """Return what a file of a device holds.
+    """Content of a device's file.
 
     Parameters
     ----------

@@ -40,7 +40,7 @@ def known_servos(drive: ServoDrive, n: int) -> list[Servo]:
 
 
 def servo_toml(drive: ServoDrive, robot: Robot) -> str:
-    """Return what is known of the servos of a robot as servo.toml."""
+    """The known servos of a robot as servo.toml."""
     first, *others = known_servos(drive, robot.n)
     differing = {joint: {"kp": servo.kp} for joint, servo in zip(robot.joints[1:], others, strict=True) if servo.kp != first.kp}
     names = {"limit": KINDS[first.kind].limit}
@@ -116,7 +116,7 @@ class Servos:
         return Joints(self.links, tuple(logs))
 
     def name(self, path: Path) -> str:
-        """Return what messages call a log: its file, with the folder where several files have the same name."""
+        """Name of a log in messages: its file, with the folder where several files have the same name."""
         return path.name if Counter(other.name for other in self.logs)[path.name] == 1 else str(path)
 
     def identified(
@@ -187,7 +187,7 @@ class Servos:
 
 
 def summary_of(fit: ServoFit) -> dict[str, Any]:
-    """Return what a summary says of a fit."""
+    """Summary of a fit."""
     sigma, bound = fit.standard_errors, fit.bound
     return {
         name: {"value": x, "sigma": sigma.get(name), "bound": bound.get(name), "unit": unit_of(fit.servo, name)}
@@ -214,7 +214,7 @@ def unit_of(servo: Servo, name: str) -> str:
 
 
 def mistake_summary(joint: str, mistake: ServoMistake) -> dict[str, Any]:
-    """Return what a summary says of what is wrong with a joint."""
+    """Summary of a joint's mistake."""
     return {
         "cause": MISTAKES[mistake.letter],
         "joint": joint,
@@ -229,5 +229,5 @@ def mistake_summary(joint: str, mistake: ServoMistake) -> dict[str, Any]:
 
 
 def lacks_summary(fit: ServoFit) -> dict[str, Any]:
-    """Return what a summary says of what a fit lacks."""
+    """Summary of a fit's residuals by state."""
     return {"friction": fit.friction, "residuals": [lack._asdict() for lack in residuals_by_state(fit)]}

@@ -62,7 +62,7 @@ class ServosFit:
         return verdict_lines(self.fits, self.errors["fitted"], self.errors.get("held out", {}), moved, self.mistakes)
 
     def parameters(self) -> dict[str, Any]:
-        """Return what a summary.json says of the fits."""
+        """Summary of the fits."""
         laws = {joint: {"errors": choice.errors, "p": choice.p} for joint, choice in self.choices.items()}
         return {
             **({"laws": laws} if laws else {}),
@@ -72,7 +72,7 @@ class ServosFit:
         }
 
     def summary(self) -> dict[str, Any]:
-        """Return what a summary.json says of the fits and of their errors."""
+        """Summary of the fits and of their errors."""
         each = {what: {joint: [float(x) for x in e] for joint, e in of.items()} for what, of in self.errors.items()}
         return self.parameters() | {"position_error": each, "verdict": [line for _, line in self.verdicts]}
 
@@ -110,7 +110,7 @@ def servos_identified(asked: ServoRequest, heard: Heard | None = None) -> Servos
 
 
 def _tested(fit: ServoFit) -> ServoMistake | None:
-    """Return what is wrong with a fit; nothing if the tests fail: an estimate is not lost with them."""
+    """Mistakes of a fit; none if the tests fail: an estimate is not lost with them."""
     try:
         return mistake_of(fit)
     except (IdentificationError, np.linalg.LinAlgError):
@@ -141,7 +141,7 @@ def servos_of(asked: ServoRequest) -> tuple[Servos, Servos | None]:
 
 
 def _known(asked: ServoRequest, robot: Robot) -> tuple[ServoFile, dict[str, PositionLoop]]:
-    """Return what is known of the servos, by --servo or by the actuators of the robot's file, and these."""
+    """Known servos, by --servo or by the actuators of the robot's file, and their joints."""
     steps = {joint: TimeSteps(*x) for joint, x in steps_of(robot).items()} if asked.simulated else {}
     if asked.servo is not None:
         return replace(ServoFile.read(asked.servo), steps=steps), {}

@@ -263,7 +263,7 @@ class Joints:
         return _attempt(partial(identify, j, runs))
 
     def _moving(self, fits: Mapping[int, ServoFit], runs: Sequence[Sequence[ServoRun]]) -> list[dict[int, Moving]]:
-        """Return how joints with these loads move by their fits, in each log."""
+        """Simulated motion of joints with these loads, in each log."""
         return [
             {
                 j: Moving(*fit.fine(runs[j][k]), offset_of(fit), fit.p["Ia"], fit.taken_late, fit.servo.steps.early)
@@ -293,7 +293,7 @@ class Joints:
 
 
 def _apart(one: Sequence[Mapping[int, Moving]], other: Sequence[Mapping[int, Moving]]) -> float:
-    """Return how far motions are apart: the largest mean difference of a joint in a log [rad]."""
+    """Largest mean difference of motions over joints and logs [rad]."""
     return max(float(np.abs(a[j].q - b[j].q).mean()) for a, b in zip(one, other, strict=True) for j in a)
 
 
@@ -303,7 +303,7 @@ def offset_of(fit: ServoFit) -> float:
 
 
 def _attempt(identify: Callable[[], Identified]) -> tuple[Identified | str, ServoFit | None]:
-    """Return what was identified, or why not; and the fit that says how the joint moves, if there is one."""
+    """Identified servo or reason for none, and the fit that moves the joint, if there is one."""
     try:
         result = identify()
     except IdentificationError as error:

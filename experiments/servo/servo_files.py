@@ -59,14 +59,14 @@ EXPRESSIBLE = ("a", "b", "Ia", "Fs", "Fv", "offset", "lag", "lead", "delay", "ra
 
 
 def cannot_express(letters: Iterable[str]) -> list[str]:
-    """Return which parameters a file of MuJoCo has no place for."""
+    """Parameters that a file of MuJoCo has no place for."""
     lost = dict.fromkeys(x for x in letters if x not in EXPRESSIBLE)
     meanings = ", ".join(f"{x} ({SERVO_PARAMETERS[x].meaning})" for x in lost)
     return [f"MuJoCo's dcmotor cannot express {meanings}: what is simulated with the file lacks that"] if lost else []
 
 
 def inexpressible(fits: Mapping[str, ServoFit]) -> list[str]:
-    """Return what MuJoCo's servos do not have of what was found."""
+    """Identified effects that MuJoCo's servos lack."""
     found = cannot_express(x for fit in fits.values() for x in fit.free)
     if any("backlash" in fit.free for fit in fits.values()):
         found.append("backlash is written as a second joint; the loop of the dcmotor sees the rotor, before the play")
@@ -76,7 +76,7 @@ def inexpressible(fits: Mapping[str, ServoFit]) -> list[str]:
 
 
 def without_servo(joints: Sequence[str], fits: Mapping[str, ServoFit]) -> list[str]:
-    """Return which joints of a written file have no servo."""
+    """Joints of a written file without a servo."""
     lost = [joint for joint in joints if joint not in fits]
     return [f"{', '.join(lost)}: no servo is written; what the robot's file has there stays"] if lost else []
 

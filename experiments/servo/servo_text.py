@@ -81,7 +81,7 @@ def print_errors(page: Page, what: str, errors: Mapping[str, Array]) -> None:
 
 
 def warnings_of(fits: Mapping[str, ServoFit | str], mistakes: Collection[str] = ()) -> list[str]:
-    """Return what to check, each thing once for all joints that it concerns; `mistakes` are joints of which one was proved."""
+    """Warnings, each once for all joints that it concerns; `mistakes` are joints of which one was proved."""
     every = ((joint, fit) for joint, fit in fits.items() if isinstance(fit, ServoFit))
     return list(_grouped((joint, text) for joint, fit in every for text in _warnings(fit, joint in mistakes)).values())
 
@@ -123,7 +123,7 @@ def _warnings(fit: ServoFit, mistaken: bool) -> Iterator[str]:
 
 
 def confounded(fit: ServoFit) -> str:
-    """Return by how much armature stands for a delay, if the log hardly tells them apart; empty if it does."""
+    """Armature per delay with which the fit would change alike, if the log hardly tells them apart; empty if it does."""
     if not {"Ia", "delay"} <= set(fit.free):
         return ""
     Ia, delay = (fit.free.index(name) for name in ("Ia", "delay"))
@@ -166,7 +166,7 @@ def verdict_lines(
 
 
 def mistake_words(mistake: ServoMistake) -> str:
-    """Return what is wrong, how sure, what else it may be, and what was proved to mend it."""
+    """Mistake, its probability, its rivals, and the proved remedy, in words."""
     what = MISTAKEN[mistake.letter].format(size=mistake.size, factor=1 + mistake.size)
     others = f"; or {', '.join(mistake.alternatives)}, which this log cannot distinguish" if mistake.alternatives else ""
     before, after = mistake.errors

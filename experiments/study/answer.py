@@ -17,7 +17,7 @@ LINES = "encoder.lines"  # The setting that people know as bits
 
 
 def requirements(cells: Sequence[Cell], edges: int = 4) -> str:
-    """Return what some typical errors ask of the only setting that varies, in words; empty if it does not decide the error.
+    """Threshold of some typical errors on the only setting that varies, in words; empty if it does not decide the error.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ def in_words(field: str, value: object, edges: int = 4) -> str:
 
 
 def answer(cells: Sequence[Cell], edges: int = 4) -> str:
-    """Return which model, in which chain, errs least and how clearly, and whether its sigma can be believed.
+    """Best model and chain, its margin, and the coverage of its sigma, in words.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def headline(cells: Sequence[Cell], edges: int = 4) -> str:
 
 
 def _asked(cells: Sequence[Cell], edges: int) -> str:
-    """Return what typical errors of the best methods ask of what varies, as a sentence; empty if nothing does."""
+    """Sentence on the settings that typical errors of the best methods need; empty if nothing varies."""
     asked = requirements([_best(group) for group in grouped(cells).values()], edges)
     return f"{asked[0].upper()}{asked[1:]}." if asked else ""
 
@@ -91,7 +91,7 @@ def grouped(cells: Sequence[Cell]) -> dict[str, list[Cell]]:
 
 
 def _who(cells: Sequence[Cell]) -> str:
-    """Return what errs least, how clearly, and how much."""
+    """Best method, its margin and its error, in words."""
     groups = list(grouped(cells).values())
     best = [_best(group) for group in groups]
     low, high = min(best, key=lambda c: c.typical), max(best, key=lambda c: c.typical)
@@ -110,7 +110,7 @@ def _who(cells: Sequence[Cell]) -> str:
 
 
 def _winners(groups: Sequence[Sequence[Cell]], best: Sequence[Cell], cells: Sequence[Cell]) -> str:
-    """Return which methods are least often significantly worse than another, and how often better than all others.
+    """Methods that are least often significantly worse than another, and how often they are best.
 
     A combination in which another errs less, but not significantly, does not count against them.
     """
@@ -161,7 +161,7 @@ def _sigmas(cells: Sequence[Cell]) -> str:
 
 
 def failures(cells: Sequence[Cell]) -> str:
-    """Return how many identifications failed; empty if none did."""
+    """Sentence on the number of failed identifications; empty if none did."""
     failed = sum(cell.failed for cell in cells)
     every = failed + sum(cell.runs for cell in cells)
     return f"{failed:,} of {every:,} identifications failed; their reasons are listed." if failed else ""
@@ -178,7 +178,7 @@ def settings_of(cell: Cell) -> dict[str, Any]:
 
 
 def method(cell: Cell, among: Sequence[Cell]) -> str:
-    """Return how a cell was identified: its model, and chain, estimator and laws of friction where those of others differ."""
+    """Method of a cell: its model, and chain, estimator and laws of friction where those of others differ."""
     chain, estimator, model = cell.names
     words = [f"chain {chain}"] if any(other.names[0] != chain for other in among) else []
     words += [estimator] if any(other.names[1] != estimator for other in among) else []

@@ -59,7 +59,7 @@ def _difference(a: Cell, b: Cell, draws: int) -> Difference:
 
 
 def _probability(one: Array, other: Array, gap: float, draws: int) -> float:
-    """Return how probable a gap is if it does not matter to which of two methods the errors of a run belong.
+    """Permutation p value of a gap between the errors of two methods.
 
     Parameters
     ----------

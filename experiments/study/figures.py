@@ -156,7 +156,7 @@ def bars(names: Sequence[str], parameters: Sequence[str], mean: Array, spread: A
 
 
 def _name(cell: Cell, cells: Sequence[Cell]) -> str:
-    """Return what to call a method beside others: its estimator, and chain and model where they differ."""
+    """Name of a method beside others: its estimator, and chain and model where they differ."""
     words = [cell.names[1]]
     words += [cell.names[0]] if len({other.names[0] for other in cells}) > 1 and cell.names[0] != cells[0].names[0] else []
     words += [cell.names[2]] if len({other.names[2] for other in cells}) > 1 else []
@@ -164,7 +164,7 @@ def _name(cell: Cell, cells: Sequence[Cell]) -> str:
 
 
 def cost_figure(seconds: dict[str, float], runs: int) -> str:
-    """Return how long a run takes, in simulation and in each method."""
+    """Picture of the time of a run, in simulation and in each method."""
     if not seconds:
         return ""
     figure = Figure(figsize=(7, 0.6 + 0.3 * len(seconds)), layout="constrained")
@@ -200,7 +200,7 @@ def _models(cells: Sequence[Cell]) -> dict[str, list[Cell]]:
 
 
 def _places(panel: Panel, group: Sequence[Cell], axis: Axis, edges: int = 4, ticks: int = SMALL_TICKS) -> Array:
-    """Return where the cells lie on an axis, logarithmic if its values are far apart, counted if they are words.
+    """Places of the cells on an axis, logarithmic if its values are far apart, counted if they are words.
 
     What is written beside the axis are its own values.
     """

@@ -34,17 +34,17 @@ def store_of(asked: StudyRequest, out: Path | None = None, *, many: bool = False
 
 
 def width_of(asked: StudyRequest) -> int:
-    """Return how many shards are computed at a time."""
+    """Number of shards at a time."""
     return asked.workers or asked.threads or os.cpu_count() or 1
 
 
 def runs_of_shard(asked: StudyRequest, store: Store) -> int:
-    """Return how many runs are simulated together."""
+    """Number of runs that are simulated together."""
     return asked.shard or min(LARGEST_SHARD, ceil(store.study.size / (2 * width_of(asked))))
 
 
 def worker_pool(asked: StudyRequest, store: Store) -> AbstractContextManager[Any]:
-    """Return where shards are computed; nowhere, if nothing is missing."""
+    """Pool that computes shards; None if nothing is missing."""
     from idbench.experiments.study.cluster import cluster_pool
 
     scheduler = asked.scheduler

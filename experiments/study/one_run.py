@@ -21,7 +21,7 @@ from idbench.sim.trajectories import Quintic
 
 
 def run_of(asked: RunRequest, tell: Callable[[str], None]) -> ScenarioRun:
-    """Return what is to be simulated, and how it is identified; `tell` hears what was assumed.
+    """Scenario and request of a run; `tell` hears what was assumed.
 
     Raises
     ------

@@ -118,7 +118,7 @@ def ratios_summary(found: Sequence[Ratio]) -> list[RatioRow]:
 
 
 def conclusion(found: Sequence[RatioRow]) -> str:
-    """Return how the errors of the implicit and the power model compare with the explicit model's, with 95 % intervals."""
+    """Errors of the implicit and the power model relative to the explicit model's, with 95 % intervals, in words."""
     implicit, power = (_of(found, pair) for pair in (["implicit", "explicit"], ["power", "explicit"]))
     words = []
     if implicit:

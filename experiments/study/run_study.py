@@ -73,7 +73,7 @@ class LocalPool(Generic[Part]):
         return self._pool.submit(self._run, runs)
 
     def partial(self) -> float:
-        """Return how many numbers the parts in progress amount to."""
+        """Size of the parts in progress [numbers]."""
         return sum(list(self._done.values()))
 
     def close(self) -> None:

@@ -105,7 +105,7 @@ def rows_of(
 
 
 def _joints(scenario: Scenario, log: MotionLog) -> Joints:
-    """Return what the owner of a scenario's servos knows of them, and of a mass that is added, with a log."""
+    """Known data of a scenario's servos and of an added mass, with a log."""
     assert isinstance(scenario.drive, ServoDrive)
     on, servos = log.conditions.get("on"), known_servos(scenario.drive, log.n)
     columns = ServoColumns(

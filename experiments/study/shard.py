@@ -63,7 +63,7 @@ PARTS = ("", ".sigma", ".paper_sigma", ".truth")
 
 
 def parts_of(study: Study) -> tuple[str, ...]:
-    """Return what the rows of a study hold of every parameter."""
+    """Columns of a study's rows for every parameter."""
     return (*PARTS, *BOUNDS) if study.bound else PARTS
 
 
@@ -153,7 +153,7 @@ def _simulate(
 
 
 def _part(progress: Progress | None, done: int, part: int, whole: int) -> Progress:
-    """Return what receives how many steps `part` runs have done, and tells the share of the whole."""
+    """Receiver of the steps that `part` runs have done, which tells the share of the whole."""
 
     def tell(steps: float) -> None:
         if progress is not None:
@@ -230,7 +230,7 @@ def _trimmed(study: Study, method: Method, simulated: Run) -> Chain:
 def _simulation(
     study: Study, method: Method, simulated: Run, together: Mapping[int, Reference | None], truth: Mapping[str, float]
 ) -> Simulation:
-    """Return how the robots of runs are simulated anew, by estimators that need it, and where these begin."""
+    """Simulation of the runs' robots, by estimators that need it, and where these begin."""
     motions = tuple(motion for motion in together.values() if motion is not None)
     needs = method.estimator.needs
     robot_model = study.subjects[method.friction]
@@ -244,7 +244,7 @@ def _simulation(
 
 
 def _failure(outcome: Estimate | IdentificationError, i: int) -> str:
-    """Return why a run has no estimate; empty if it has one."""
+    """Reason why a run has no estimate; empty if it has one."""
     if isinstance(outcome, IdentificationError):
         return str(outcome)
     if (i,) in outcome.failures:
@@ -255,7 +255,7 @@ def _failure(outcome: Estimate | IdentificationError, i: int) -> str:
 
 
 def _columns(estimate: Estimate, truth: Mapping[str, float], bounds: Mapping[str, Array]) -> dict[str, list[Any]]:
-    """Return what an estimate of many runs found, a list with the value of each run."""
+    """Results of an estimate of many runs, each a list with the value of each run."""
     runs = len(estimate.X)
     found = estimate.X, estimate.standard_errors, estimate.own_sigma, np.tile(list(truth.values()), (runs, 1))
     parts = {**dict(zip(PARTS, found, strict=True)), **bounds}
@@ -279,7 +279,7 @@ def _fail(shard: Shard, study: Study, scenarios: Mapping[int, Scenario], runs: S
 
 
 def _common(study: Study, method: Method, run: int, model: str, seed: int) -> dict[str, Any]:
-    """Return what every row says."""
+    """Columns of every row."""
     settings = {s.axis.field: s.label for s in (*study.points[run // study.seeds].settings, *method.settings)}
     names = {"chain": method.chain_name, "estimator": method.estimator_name, "model": model}
     return {"run": run, "seed": seed, **settings, **names, "failure": None}

@@ -137,7 +137,7 @@ class Cell:
         return np.array([(i.low, i.high) if i else (np.nan, np.nan) for i in found])
 
     def _inside(self, sigma: Array) -> tuple[np.typing.NDArray[np.int64], np.typing.NDArray[np.int64]]:
-        """Return how many truths lie within SIGMAS `sigma`, and how many have a sigma, shape (p,) each."""
+        """Number of truths within SIGMAS `sigma`, and number that have a sigma, shape (p,) each."""
         inside = np.abs(self.X - self.truth) <= SIGMAS * sigma
         return inside.sum(axis=0), np.isfinite(sigma).sum(axis=0)
 

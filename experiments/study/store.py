@@ -70,7 +70,7 @@ def require_of(path: Path, study: Study) -> None:
 
 
 def shard_header(path: Path) -> dict[str, str]:
-    """Return what a shard says of itself; raise StudyError if it is damaged."""
+    """Metadata of a shard; raise StudyError if it is damaged."""
     try:
         metadata = pq.read_schema(path).metadata or {}
     except (OSError, pa.ArrowInvalid) as error:
@@ -213,7 +213,7 @@ class Store:
         return found[0] if found else []
 
     def seconds(self) -> dict[str, float]:
-        """Return how long simulation and each method took, summed over the finished shards [s]."""
+        """Time of simulation and of each method, summed over the finished shards [s]."""
         total: dict[str, float] = {}
         for path in self.shards():
             for what, seconds in json.loads(shard_header(path)["seconds"]).items():

@@ -142,7 +142,7 @@ class Study:
             raise StudyError(f"{given[-1]} does not go with {found[0]}")
 
     def logs_of(self, model: str) -> int:
-        """Return how many logs of a run a model has."""
+        """Number of logs of a run for a model."""
         if self.of_servos or self.rows == "own":
             return self.realizations
         n = next(iter(self.subjects.values())).basis.n

@@ -199,7 +199,7 @@ def print_study(page: Console, study: Study, found: Sequence[Cell]) -> None:
 
 
 def _held(cell: Cell) -> str:
-    """Return how many truths lie within two sigma, of those parameters that the cell has."""
+    """Coverage of two sigma over the parameters of the cell."""
     held = cell.coverage(cell.sigma)
     return f"{100 * np.nanmean(held):.0f} %" if np.isfinite(held).any() else ""
 
@@ -209,7 +209,7 @@ def _often(cell: Cell, shown: Sequence[str]) -> list[str]:
 
 
 def _reasons(found: Sequence[Cell]) -> list[str]:
-    """Return why runs failed, the most frequent reason first."""
+    """Reasons of failed runs, the most frequent first."""
     counts: Counter[str] = Counter()
     for cell in found:
         counts.update({reason: len(runs) for reason, runs in cell.failures.items()})
@@ -217,7 +217,7 @@ def _reasons(found: Sequence[Cell]) -> list[str]:
 
 
 def summary_of(study: Study, found: Sequence[Cell], seconds: dict[str, float]) -> dict[str, Any]:
-    """Return what a summary.json says of a study."""
+    """Summary of a study."""
     return {
         "experiment": "study",
         "versions": versions(),

@@ -36,7 +36,7 @@ def _by_size(entry: tuple[Cell, str, float, int]) -> float:
 
 
 def command(study: Study, folder: Path, cell: Cell, run: int) -> str:
-    """Return what makes a run again, identified as in a cell."""
+    """Command that makes a run again, identified as in a cell."""
     number = next(i for i, found in enumerate(study.methods) if found.names == cell.names[:2] and found.fits(cell.settings))
     chosen = f" --method {number}" if number else ""
     return f"{program()} run --from {quote(str(folder))} --index {run}{chosen}"

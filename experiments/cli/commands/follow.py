@@ -104,7 +104,7 @@ class Follower:
             sys.stderr.write(f"idbench: {_words(live, float(log.t[-1]))}\n")
 
     def _so_far(self) -> MotionLog | None:
-        """Return what the complete lines of the file hold; None if nothing can be made of them yet, which is said once."""
+        """Log of the file's complete lines; None if they cannot be read yet, which is said once."""
         lines, _ = self._read()
         with tempfile.TemporaryDirectory(prefix="idbench-") as folder:
             copy = Path(folder) / self.path.name
@@ -124,7 +124,7 @@ class Follower:
         return None if delay_method(self.options.delay) else self.options.delay
 
     def _begun(self, log: MotionLog) -> "LiveIdentification":
-        """Return what grows, begun with the first look; a recording of the motion is made for who watches alone."""
+        """Growing recording, begun with the first look."""
         if self._live is not None:
             return self._live
         from idbench.experiments.recording.columns import parts
@@ -143,7 +143,7 @@ class Follower:
 
 
 def _words(live: "LiveIdentification", now: float) -> str:
-    """Return how much is known of the parameters after `now` [s]."""
+    """Line on the parameters after `now` [s]."""
     if live.fit is None:
         return f"{now:.1f} s"
     estimate = next(iter(live.fit.estimates.values()))

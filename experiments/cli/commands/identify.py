@@ -95,7 +95,7 @@ def identify(options: Identify) -> None:
 
 
 def _checked(judgement: Judgement, options: Identify, attempts: Attempts) -> Mapping[str, Sequence[str]]:
-    """Return what to check first."""
+    """Warnings, in the order in which to check them."""
     with stages_of("checking"):
         delay = delay_method(options.torque_delay) is None
         return attempts.attempt("the checks", lambda: checks(judgement, delay=delay, trials=not options.no_trials)) or {}

@@ -67,7 +67,7 @@ def _draw(page: Page, options: ShowLog, facts: LogFacts) -> None:
 
 
 def _understood(options: ShowLog) -> tuple[Guess, LogColumns]:
-    """Return what the columns are, stated or guessed, and the columns."""
+    """Layout, stated or guessed, and columns."""
     path = options.log if options.log.name else options.log.resolve()  # the folder in which one is
     if path.suffix.lower() == LAYOUT_FILE:
         return Guess(LogLayout.read(path)), read_columns(path)
@@ -137,7 +137,7 @@ def _decimal(step: float) -> bool:
 
 
 def _target(options: ShowLog) -> Path:
-    """Return where the layout of a log goes."""
+    """Path of a log's layout."""
     stem = options.log.with_suffix("") if options.log.suffix.lower() == ".gz" else options.log
     return stem.with_suffix(LAYOUT_FILE)
 

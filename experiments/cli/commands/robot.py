@@ -48,7 +48,7 @@ def describe(options: DescribeRobot) -> None:
 
 
 def _summary(robot_model: RobotModel, truth: dict[str, float], counts: dict[str, Operations]) -> dict[str, Any]:
-    """Return what --json says of a robot."""
+    """Content of --json for a robot."""
     tree = robot_model.tree
     return {
         "robot": robot_model.name,
