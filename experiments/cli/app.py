@@ -4,7 +4,6 @@ import os
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from typing import Literal
 
 from idbench.experiments.cli.interruption import INTERRUPTED, Notice, TerminatedError, importing, noticing, terminating
 from idbench.experiments.errors import ExperimentError, is_told, reason, report, visible
@@ -80,13 +79,6 @@ def _require_memory() -> None:
                 f"this process may have {1e-9 * limit:.2g} GB of address space (ulimit -v), idbench needs {LEAST_MEMORY:g} "
                 "GB: raise it, as in ulimit -v unlimited"
             )
-
-
-def completion(shell: Literal["bash", "zsh", "fish"]) -> str:
-    """Return the script that lets bash, zsh or fish complete commands and options."""
-    from idbench.experiments.cli.parser import every_command
-
-    return every_command(COMMANDS, DESCRIPTION).generate_completion(shell=shell)
 
 
 def command(name: str) -> Callable[[type], type]:

@@ -8,6 +8,7 @@ from difflib import get_close_matches
 from inspect import Parameter as Signature
 from inspect import cleandoc, getsource
 from itertools import pairwise, takewhile
+from pathlib import Path
 from textwrap import dedent
 from types import UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
@@ -26,10 +27,10 @@ COUNTS = ("", "", "two", "three", "four", "five", "six")  # Numbers of values th
 CLOSE = 0.7  # Likeness of words from which on one is taken for a slip of the other
 
 
-def app_of(name: str, options: type, shown: Container[str] | None = None, place: int | None = None) -> App:
+def app_of(name: str, options: type, shown: Container[str] | None = None, place: int = 0) -> App:
     """The command of a class of options; its help has all of them, or those that are `shown`."""
-    app = _app(name, options.__doc__ or "", place)
-    marked = _marked(options, shown)
+    app = _app(name, options.__doc__ or "", "Help", place)
+    marked = _marked(options, shown, Group("Options"))
 
     def made(asked: Annotated[marked, Parameter(name="*")]) -> Any:  # type: ignore[valid-type]
         return _unmarked(asked)
@@ -40,15 +41,14 @@ def app_of(name: str, options: type, shown: Container[str] | None = None, place:
     return app
 
 
-def _app(name: str, text: str, place: int | None = None) -> App:
+def _app(name: str, text: str, title: str, place: int = 0) -> App:
     return App(
         name,
         joined(text),
         help_format="plaintext",
         version_flags=(),
         result_action="return_value",
-        group_commands=Group("Help" if place is None else "Commands", sort_key=9),
-        group_parameters=Group("Options"),
+        group_commands=Group(title, sort_key=9),
         sort_key=place,
     )
 
@@ -69,7 +69,7 @@ def texts_of(options: type) -> dict[str, str]:
     return found
 
 
-def _marked(options: type, shown: Container[str] | None) -> type:
+def _marked(options: type, shown: Container[str] | None, group: Group) -> type:
     """A class of options with the marks of the library on its fields; those that are typed without a name come first."""
     hints = get_type_hints(options, include_extras=True)
     texts = texts_of(options)
@@ -79,11 +79,13 @@ def _marked(options: type, shown: Container[str] | None) -> type:
         hint = hints[each.name]
         word = word_of(hint)
         if (inner := group_of(hint)) is not None:
-            annotations[each.name] = Annotated[_marked(inner, shown), Parameter(name="*")]
+            of = Group(f"Options: {each.name}", help=texts.get(each.name, ""), sort_key=5)
+            annotations[each.name] = Annotated[_marked(inner, shown, of), Parameter(name="*")]
             space[each.name] = field(default_factory=get_args(annotations[each.name])[0], kw_only=True)
             continue
         plain, visible = _plain(hint), shown is None or each.name in shown
         several = get_origin(plain) is tuple
+        whole = _stated(hint) is int
         parameter = Parameter(
             name=[
                 *([] if word.positional else [f"--{word.option or each.name.replace('_', '-')}"]),
@@ -93,7 +95,12 @@ def _marked(options: type, shown: Container[str] | None) -> type:
             help=texts.get(each.name),
             metavar=word.metavar or None,
             negative=None if plain is bool and not word.flag else (),
-            consume_multiple=(1, None) if several and not word.positional else None,
+            consume_multiple=(1, None) if several else None,
+            converter=(lambda _, tokens: int(tokens[0].value)) if whole else None,  # 2.5 is none
+            n_tokens=1 if whole else None,
+            allow_repeating=None if several else True,
+            json_list=False,
+            group=group,
             show=visible,
             show_default=_default if each.default not in (None, (), "", MISSING, False) else False,
             show_choices=get_origin(plain) is Literal,
@@ -104,6 +111,13 @@ def _marked(options: type, shown: Container[str] | None) -> type:
     made: Any = dataclass(frozen=True)(type(options.__name__, (options,), space))
     made.__dataclass_fields__ = dict(sorted(made.__dataclass_fields__.items(), key=lambda each: each[1].kw_only is True))
     return made
+
+
+def _stated(hint: Any) -> Any:
+    """The type of a value that is given: without None."""
+    plain = _plain(hint)
+    union = get_origin(plain) in (Union, UnionType)
+    return next(t for t in (get_args(plain) if union else (plain,)) if t is not type(None))
 
 
 def _default(value: Any) -> str:
@@ -133,7 +147,7 @@ def _plain(hint: Any) -> Any:
 
 def every_command(commands: Mapping[str, type], description: str) -> App:
     """All commands as one."""
-    every = _app("idbench", description)
+    every = _app("idbench", description, "Commands")
     for place, (name, options) in enumerate(commands.items()):
         every.command(app_of(name, options, None, place))
     return every
@@ -162,10 +176,23 @@ def parsed(words: Sequence[str], commands: Mapping[str, type], description: str)
             print(f"{_hidden(options, essential)} more options: idbench {name} {ALL}")  # noqa: T201  # as the library prints
         return None
     _require_once(rest)
+    _require_no_value(rest, options)
     try:
-        made, bound, _ = app.parse_args(rest, exit_on_error=False, print_error=False)
+        return _made(app, rest)
+    except MissingArgumentError as error:
+        if error.argument is None or error.keyword or rest[-1:] == [] or rest[-1].startswith("-"):
+            raise ExperimentError(_said(error, words, options)) from None
+        # An option of several words has taken the last one, which has no name.
+        try:
+            return _made(app, [rest[-1], *rest[:-1]])
+        except CycloptsError:
+            raise ExperimentError(_said(error, words, options)) from None
     except CycloptsError as error:
         raise ExperimentError(_said(error, words, options)) from None
+
+
+def _made(app: App, words: Sequence[str]) -> Any:
+    made, bound, _ = app.parse_args(words, exit_on_error=False, print_error=False)
     return made(*bound.args, **bound.kwargs)
 
 
@@ -186,7 +213,8 @@ def _require_command(words: Sequence[str], commands: Mapping[str, type]) -> None
 
 def _require_once(words: Sequence[str]) -> None:
     """Raise ExperimentError if an option is given twice: the values of the first would be lost, or joined."""
-    places = [k for k, word in enumerate(words) if word.startswith("--") and word != "--"]
+    words = list(takewhile(lambda word: word != "--", words))
+    places = [k for k, word in enumerate(words) if word.startswith("--")]
     options = [words[k].partition("=")[0].replace("_", "-") for k in places]
     if twice := next((option for k, option in enumerate(options) if option in options[:k]), None):
         given = [_given(twice, words[k:]) for k, option in zip(places, options, strict=True) if option == twice]
@@ -194,19 +222,30 @@ def _require_once(words: Sequence[str]) -> None:
         raise ExperimentError(f"{twice} is given twice: give it once, and all its values if it takes several: {once}")
 
 
+def _require_no_value(words: Sequence[str], options: type) -> None:
+    """Raise ExperimentError if an option that is on or off is given a value, or another the word none."""
+    kinds = dict(_options(options))
+    for option, word in pairwise(words):
+        if word.lower() in ("none", "null") and _stated(kinds.get(option, str)) not in (str, Path):
+            raise ExperimentError(f"{option} {word}: leave {option} out instead")
+    switches = {name for name, hint in kinds.items() if hint is bool}
+    if given := next((w for w in words if "=" in w and w.partition("=")[0].replace("_", "-") in switches), None):
+        raise ExperimentError(f"{given}: {given.partition('=')[0]} takes no value")
+
+
 def _said(error: CycloptsError, words: Sequence[str], options: type) -> str:
     """What is wrong, and what to type instead."""
     name, argument = words[0], error.argument
     help_ = f"{program()} {name} {ALL}"
     if isinstance(error, UnknownOptionError):
-        known = sorted(_options(options))
-        word = next((w for w in words[1:] if w.startswith("-") and w.partition("=")[0] not in known), words[-1])
+        known = [option for option, _ in _options(options)]
+        word = str(error.token.keyword or error.token.value)
         return f"{name} has no option {word}{did_you_mean(word, known)}; {help_} lists all"
     if isinstance(error, UnusedCliTokensError):
         return f"{name} takes no further word {(error.unused_tokens or ['?'])[0]!r}: {help_} lists all"
     if argument is None:
         return f"{' '.join(words)}: {' '.join(str(error).split())}; {help_} tells more"
-    called, kind = _called(argument), _kind(argument)
+    called, kind = _called(argument), _stated(argument.hint)
     if isinstance(error, CoercionError) and error.token is not None and get_origin(kind) is Literal:
         value, known = error.token.value, [str(x) for x in get_args(kind)]
         said = f"{called} {value}: no such choice{did_you_mean(value, known)}; known: {', '.join(sorted(known))}"
@@ -215,7 +254,8 @@ def _said(error: CycloptsError, words: Sequence[str], options: type) -> str:
         said = f"{given}: give {_wanted(argument)}: {' '.join(str(argument.parameter.help).split())}"
     elif isinstance(error, MissingArgumentError) and not argument.tokens and not error.keyword:
         required = [each.name for each in fields(options) if each.default is MISSING and each.default_factory is MISSING]
-        said = f"{name} needs {', '.join(required[required.index(called) :])}; {help_} tells more"
+        rest = required[required.index(called) :] if called in required and len(words) == 1 else [called]
+        said = f"{name} needs {', '.join(rest)}; {help_} tells more"
     else:
         said = f"{called} needs {_wanted(argument)}: {help_} tells more"
     return said
@@ -232,13 +272,6 @@ def _called(argument: Any) -> str:
     return str(argument.name) if named else str(argument.keys[-1] if argument.keys else argument.name)
 
 
-def _kind(argument: Any) -> Any:
-    """The type of a value, without None."""
-    stated = _plain(argument.hint)
-    union = get_origin(stated) in (Union, UnionType)
-    return next(t for t in (get_args(stated) if union else (stated,)) if t is not type(None))
-
-
 def _given(option: str, words: Sequence[str]) -> list[str]:
     """The words that were given to an option."""
     plain = [word.replace("_", "-") if word.startswith("--") else word for word in words]
@@ -252,9 +285,11 @@ def _given(option: str, words: Sequence[str]) -> list[str]:
 
 def _wanted(argument: Any) -> str:
     """What an option takes, in words."""
-    kind = _kind(argument)
+    kind = _stated(argument.hint)
     inner = get_args(kind) or (kind,)
     number = next((t for t in inner if t in KINDS), None)
+    if get_origin(kind) is Literal:
+        return " or ".join(map(str, inner))
     if number is None:
         return str(argument.parameter.metavar or getattr(kind, "__name__", kind).upper())
     if len(inner) > 1 and inner[-1] is not Ellipsis:
@@ -262,12 +297,14 @@ def _wanted(argument: Any) -> str:
     return f"{KINDS[number].removeprefix('a ')}s" if Ellipsis in inner else KINDS[number]
 
 
-def _options(command: Any) -> Iterator[str]:
-    """The options of a command, those of its groups, too."""
-    hints = get_type_hints(command)
+def _options(command: Any) -> Iterator[tuple[str, Any]]:
+    """The options of a command and their types, those of its groups, too."""
+    hints = get_type_hints(command, include_extras=True)
     for each in fields(command):
-        if is_dataclass(hint := hints[each.name]):
+        hint, word = _plain(hints[each.name]), word_of(hints[each.name])
+        if is_dataclass(hint):
             yield from _options(hint)
-        else:
-            name = each.name.replace("_", "-")
-            yield from (f"--{name}", *((f"--no-{name}",) if hint is bool else ()))
+        elif not word.positional:
+            name = word.option or each.name.replace("_", "-")
+            names = [f"--{name}", *filter(None, [word.short]), *([f"--no-{name}"] if hint is bool and not word.flag else [])]
+            yield from ((option, hint) for option in names)

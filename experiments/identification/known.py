@@ -186,7 +186,7 @@ def _require_sigma(name: str, sigma: float) -> None:
 
 
 def _grouped(grouping: BaseParameters, names: Sequence[str]) -> str:
-    """Base parameters in which parameters are grouped with others."""
+    """Sentence on the base parameters in which parameters are grouped with others."""
     made = [f"{base} = {text}" for base, text in grouping.groupings.items() if any(name in text.split() for name in names)]
     return f"no base parameter is made of {', '.join(names)} alone ({'; '.join(made[:3]) or 'they move nothing'})"
 

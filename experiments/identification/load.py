@@ -89,7 +89,7 @@ class SimulatedLogs:
         return bool(np.quantile(share, 0.25) <= EVIDENT and np.median(share) <= HALF and share.max() <= 1)
 
     def _left(self, logs: Sequence[MotionLog], request: Request) -> Array:
-        """Residual torque of the file's parameters, shape (joint,)."""
+        """Norm of the residual torque of the file's parameters, shape (joint,)."""
         plain, chain = self.robot_model.plain, request.processing
         filed = np.array(list(plain.truth(self.robot_model.robot).values()))
         each = (instants(chain.signals(log), plain.basis, ExplicitModel(), chain, filed).in_rows(chain) for log in logs)

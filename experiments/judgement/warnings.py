@@ -225,7 +225,7 @@ def _work(log: MotionLog) -> float:
 
 
 def _poorly_known(fit: Fit) -> list[str]:
-    """Base parameters that the log leaves open by more than a brisk motion shows, and the moves to make.
+    """Base parameters of which one sigma shows in the torque of a brisk motion, and the moves to make.
 
     By the part of sigma due to noise: another motion does not mend the model.
     """

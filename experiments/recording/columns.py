@@ -18,7 +18,7 @@ SHOWN, POSES = 62.5, 31.25
 
 
 def shown(first: int, count: int, fs: float, most: float = SHOWN) -> np.typing.NDArray[np.bool_]:
-    """Recorded samples among `count` from number `first` on, at a sampling frequency `fs` [Hz]."""
+    """Mask of the recorded samples among `count` from number `first` on, at a sampling frequency `fs` [Hz]."""
     return (first + np.arange(count)) % max(1, int(fs / most)) == 0
 
 

@@ -251,7 +251,7 @@ class Base:
             self._curves(self.stream, "qdd/true", middle, (np.diff(qd, axis=0) * self._fs)[kept])
 
     def _kept(self, first: int, t: Array) -> np.typing.NDArray[np.bool_]:
-        """Recorded samples: as many as can be seen, and all where the inside of the loop is recorded, too."""
+        """Mask of the recorded samples: as many as can be seen, and all where the inside of the loop is recorded, too."""
         return shown(first, len(t), self._fs) | ((t >= self._window[0]) & (t <= self._window[1]))
 
     def inside(self, inner: Inner) -> None:

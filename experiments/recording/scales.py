@@ -33,7 +33,7 @@ class AbstractScale(ABC):
         return np.clip((self._bent(np.asarray(x, dtype=np.float64)) - low) / ((high - low) or 1.0), 0.0, 1.0)
 
     def holds(self, x: npt.ArrayLike) -> npt.NDArray[np.bool_]:
-        """Values between the ends."""
+        """Mask of the values between the ends."""
         low, high = sorted((self.low, self.high))
         return (np.asarray(x) >= low) & (np.asarray(x) <= high)
 

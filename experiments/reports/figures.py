@@ -79,7 +79,7 @@ def causes_figure(fit: Fit) -> str:
 
 
 def _most_explained(rows: Rows, cause: Cause) -> tuple[npt.NDArray[np.bool_], Array]:
-    """Rows of the joint where a mistake explains most, and its share of all rows."""
+    """Rows of the joint where a mistake explains most, and the torque that it explains in all rows."""
     explained = cause.suspect.explained
     assert explained is not None
     squares, of_all = (np.sum(rows.by_kind(x * rows.valid) ** 2, axis=-1) for x in (explained, rows.Y))

@@ -110,7 +110,7 @@ def servos_identified(asked: ServoRequest, heard: Heard | None = None) -> Servos
 
 
 def _tested(fit: ServoFit) -> ServoMistake | None:
-    """Mistakes of a fit; none if the tests fail: an estimate is not lost with them."""
+    """The mistake of a fit; None if there is none, or the tests fail: an estimate is not lost with them."""
     try:
         return mistake_of(fit)
     except (IdentificationError, np.linalg.LinAlgError):
@@ -141,7 +141,7 @@ def servos_of(asked: ServoRequest) -> tuple[Servos, Servos | None]:
 
 
 def _known(asked: ServoRequest, robot: Robot) -> tuple[ServoFile, dict[str, PositionLoop]]:
-    """Known servos, by --servo or by the actuators of the robot's file, and their joints."""
+    """Known servos, by --servo or by the actuators of the robot's file, and the loops of these."""
     steps = {joint: TimeSteps(*x) for joint, x in steps_of(robot).items()} if asked.simulated else {}
     if asked.servo is not None:
         return replace(ServoFile.read(asked.servo), steps=steps), {}

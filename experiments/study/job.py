@@ -44,7 +44,7 @@ def runs_of_shard(asked: StudyRequest, store: Store) -> int:
 
 
 def worker_pool(asked: StudyRequest, store: Store) -> AbstractContextManager[Any]:
-    """Pool that computes shards; None if nothing is missing."""
+    """Context of the pool that computes shards; without a pool if nothing is missing."""
     from idbench.experiments.study.cluster import cluster_pool
 
     scheduler = asked.scheduler

@@ -115,7 +115,7 @@ def guess(path: Path, table: LogTable | None = None) -> Guess:
 
 
 def _episodes(table: LogTable) -> tuple[dict[str, float], list[str]]:
-    """Rows of the first episode, where a file has several."""
+    """Condition that selects the first episode, where a file has several, and doubts."""
     for name, column in table.columns.items():
         if name.lower() in EPISODES and column.ndim == 1 and len(values := np.unique(column)) > 1:
             first = float(values[0])

@@ -145,7 +145,7 @@ class LogLayout:
         return replace(self, **changed)
 
     def words(self, path: Path) -> str:
-        """File that describes columns and units."""
+        """Sentence on where each quantity and its unit are from."""
         each = [
             f"{name} from {', '.join(source.columns[:3])}{', ...' * (len(source.columns) > 3)} in {source.unit or SI[name]}"
             for name in QUANTITIES

@@ -122,7 +122,7 @@ def _ratio(some: Array, others: Array) -> float:
 
 
 def _touched(grouping: BaseParameters, X: Array) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
-    """Base values and standard parameters that constraints touch.
+    """Masks of base values and standard parameters that constraints touch.
 
     What is a base value by itself, such as friction, and has a sign that it may have, is not: it stays as it was estimated,
     whatever the bodies do that its estimate is correlated with.

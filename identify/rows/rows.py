@@ -128,7 +128,7 @@ class Rows:
         return np.matmul(self.W, X[..., None])[..., 0]
 
     def of_log(self, k: int) -> slice:
-        """Mask of the rows of log `k`."""
+        """Rows of log `k`, as a slice."""
         ends = np.cumsum([0, *(part.rows for part in self.maps)])
         return slice(int(ends[k]), int(ends[k + 1]))
 

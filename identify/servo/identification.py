@@ -31,7 +31,7 @@ class OffsetJoint(NamedTuple):
 
 
 def per_offset(fit: ServoFit, runs: Sequence[ServoRun], other: Sequence[ServoRun]) -> Array:
-    """Derivative of the free parameters by another joint's position offset, shape (p,) [1/rad].
+    """Derivative of the free parameters by another joint's position offset [rad], shape (p,).
 
     Parameters
     ----------

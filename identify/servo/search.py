@@ -95,10 +95,6 @@ class ServoSearch:
         )
         return np.nan_to_num(total, nan=np.inf, posinf=np.inf)
 
-    def cost_of(self, p: Mapping[str, float]) -> float:
-        """Return the objective of parameters."""
-        return float(self.cost(self._loop.simulate(p))[0])
-
     def best(self, start: Mapping[str, float], rounds: int = 30) -> Found:
         """Return the best parameters that are found from a start.
 

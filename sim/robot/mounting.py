@@ -66,7 +66,7 @@ FIELDS = {"Ia": "armature", "Fv": "damping", "Fs": "frictionloss"}
 
 
 def with_values(values: Mapping[str, float | None]) -> Callable[[mujoco.MjSpec], None]:
-    """Edit that gives the joints of a robot these armatures and frictions, by the parameter's name; None if there are none."""
+    """Edit that gives the joints of a robot these armatures and frictions, by the parameter's name; None changes nothing."""
 
     def edit(spec: mujoco.MjSpec) -> None:
         for j, joint in enumerate(spec.joints):

@@ -242,7 +242,7 @@ def _read(path: Path) -> tuple[mujoco.MjSpec, list[str]]:
 
 
 def _of_a_part(path: Path) -> str:
-    """File to give instead of one that others include."""
+    """Hint which file to give instead of one that others include."""
     others = [other for other in sorted(path.parent.glob("*.xml")) if other != path and _includes(other, path.name)]
     named = f": give {' or '.join(map(str, others))}" if others else ", which is the one to give"
     return f"this file is a part that another includes{named}"
@@ -256,7 +256,7 @@ def _includes(other: Path, name: str) -> bool:
 
 
 def _smaller_side(limits: Array) -> float:
-    """Half width of a range about 0; of one that lies to one side of it, its farther end."""
+    """Distance of the nearer end of a range from 0; of a range that lies to one side of it, of the farther one."""
     low, high = (float(x) for x in limits)
     return min(-low, high) if low < 0 < high else max(abs(low), abs(high))
 

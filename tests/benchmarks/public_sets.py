@@ -22,7 +22,7 @@ from rich.console import Console
 from set_tables import print_rows
 from set_tools import judged, predictions, what_tools_read, write_for_tools
 
-from idbench.experiments.errors import ExperimentError, is_told, reason
+from idbench.experiments.errors import ExperimentError, is_told, reason, report
 from idbench.experiments.exports.exports import EXPORTS
 from idbench.experiments.identification.fit import Fit
 from idbench.experiments.identification.fitting import fit
@@ -329,21 +329,22 @@ def main() -> int:
     parser.add_argument("sets", nargs="+", type=Path, help=f"folders with a {FILE} and its data")
     parser.add_argument("--out", type=Path, default=Path("runs/benchmark"))
     asked = parser.parse_args()
-    rows, failed = [], {}
-    for folder in asked.sets:
-        out = asked.out / folder.resolve().name
+    rows, failed, names = [], {}, [folder.resolve().name for folder in asked.sets]
+    for folder, name in zip(asked.sets, names, strict=True):
+        out = asked.out / name
         try:
+            if names.count(name) > 1 or out.resolve() == folder.resolve():
+                raise ExperimentError("its results would go where others are: rename the folder, or choose another --out")
             definition = read_definition(folder)
             out.mkdir(parents=True, exist_ok=True)
             row = (identified_row if definition.servo is None else servo_row)(folder, definition, out)
-        except Exception as error:
-            if not is_told(error):
-                raise
-            failed[folder.name] = reason(error)
+        except Exception as error:  # a fault of one set takes no other away
+            failed[name] = reason(error) if is_told(error) else f"{reason(error)}; its traceback is in {report(error)}"
             continue
-        rows.append({"set": folder.resolve().name, **json.loads(json.dumps(row))})
+        rows.append({"set": name, **json.loads(json.dumps(row))})
         write_summary(out / "summary.json", rows[-1])
-    print_rows(Console(), rows)
+    if rows:
+        print_rows(Console(), rows)
     for name, why in failed.items():
         print(f"{name}: {why}", file=sys.stderr)
     return 1 if failed else 0

@@ -210,17 +210,6 @@ def _agree(found: Row) -> str:
     return f"{100 * found['inside'] / found['compared']:.0f} %" if found.get("compared") else ""
 
 
-def shares(row: Row) -> dict[str, list[float]]:
-    """Return the torque errors of each joint over its torque [%], by tool."""
-    every = {tool: share(row, logs) for tool, logs, _ in _tools(row)}
-    return {(OWN if tool.startswith(OWN) else tool): [float(x) for x in e if np.isfinite(x)] for tool, e in every.items()}
-
-
-def shares_of_sets(rows: Sequence[Row]) -> list[tuple[str, Mapping[str, Sequence[float]]]]:
-    """Return titles of sets that have torques, and the errors of each joint over its torque [%], by tool."""
-    return [(row["title"], shares(row)) for row in rows if row_measure(row) is TORQUE]
-
-
 def errors_figure(sets: Sequence[tuple[str, Mapping[str, Sequence[float]]]]) -> Figure:
     """Return torque errors of every joint [% of its torque], by set and tool: a line a set, a colour a tool."""
     tools = list(dict.fromkeys(tool for _, each in sets for tool in each))

@@ -1,14 +1,15 @@
-"""The command that prints what a shell needs to complete the others."""
+"""The command that prints a script for a shell."""
 
 from rich.text import Text
 
-from idbench.experiments.cli.app import completion
+from idbench.experiments.cli.app import COMMANDS, DESCRIPTION
 from idbench.experiments.cli.options.tools import Completion
+from idbench.experiments.cli.parser import every_command
 from idbench.experiments.results.page import new_page
 
 
 def complete(options: Completion) -> None:
-    """Print a script that completes commands, options and their values."""
-    page = new_page()
-    page.print(Text(completion(options.shell)), soft_wrap=True)
+    """Print the script; bash names files where there are no words."""
+    page, script = new_page(), every_command(COMMANDS, DESCRIPTION).generate_completion(shell=options.shell)
+    page.print(Text(script.replace("complete -F ", "complete -o default -F ")), soft_wrap=True)
     page.close()

@@ -54,7 +54,7 @@ def excite(options: Excite) -> None:
 
 
 def _files(found: Excited, sequence: MotionSequence | None) -> Files:
-    """Writer of motions, logs and scenario."""
+    """Writers of motions, logs and scenario, by the names of files."""
     files = dict[str, Callable[[Path], object]]()
     for number, each in enumerate(sequence.rounds if sequence else (), 1):
         files[f"log{number}.parquet"] = partial(write_log, each.log)

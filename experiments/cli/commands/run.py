@@ -59,7 +59,7 @@ def run(options: RunCommand) -> None:
 
 
 def _files(ran: ScenarioRun) -> Files:
-    """Writer of log and scenario, and of servos, if there are any."""
+    """Writers of log and scenario, and of servos, if there are any, by the names of files."""
     drive, robot = ran.scenario.drive, ran.run.robots[0]
     files: Files = {"log.parquet": partial(write_log, ran.run.alone()), "scenario.toml": partial(write_scenario, ran.scenario)}
     if not isinstance(drive, ServoDrive):

@@ -170,7 +170,7 @@ class JointFit:
         return self.levels.torque if self.near is None else self.near
 
     def _turns(self, cells: Cells, z: Array, qd: Array, slow: npt.NDArray[np.bool_]) -> Turns:
-        """Mask of slow cells, shape (joint, cell)."""
+        """Turns that leave out friction in slow cells, a mask of shape (joint, cell), or use it."""
         if self.near is None:
             return Turns.none((self.basis.n, cells.count))
         return Turns.of(cells, self.basis, self.X, z, stretches(qd, slow), self.near)
@@ -238,7 +238,7 @@ def _differences(cells: Cells) -> Array:
 
 
 def _nodes(cells: Cells) -> tuple[Array, Array]:
-    """Offset of the nodes from the samples [s], and their reach beyond the ends."""
+    """Instants of the nodes within the log [s], and their distance beyond its ends."""
     nodes = np.arange(cells.count + 1) * cells.period + cells.delay
     inside = np.clip(nodes, 0, (cells.log.samples - 1) * cells.period)
     return inside, nodes - inside

@@ -183,7 +183,7 @@ class Turns:
 
     @classmethod
     def of(cls, cells: Cells, basis: Basis, X: Array, z: Array, found: list[ReversalStretch], margin: Array) -> Self:
-        """Stretches of a motion z; `margin` is the uncertainty of torques near reversals, shape (joint,)."""
+        """Turns of a motion z in stretches; `margin` is the uncertainty of torques near reversals, shape (joint,)."""
         turns = cls.none((basis.n, cells.count))
         for joint in sorted({one.joint for one in found}):
             own = [turns._slowest(one, z[one.begin : one.end, 1, joint]) for one in found if one.joint == joint]
