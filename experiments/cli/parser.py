@@ -226,7 +226,8 @@ def _require_no_value(words: Sequence[str], options: type) -> None:
     """Raise ExperimentError if an option that is on or off is given a value, or another the word none."""
     kinds = dict(_options(options))
     for option, word in pairwise(words):
-        if word.lower() in ("none", "null") and _stated(kinds.get(option, str)) not in (str, Path):
+        kind = kinds.get(option, str)
+        if word.lower() in ("none", "null") and type(None) in get_args(kind) and _stated(kind) not in (str, Path):
             raise ExperimentError(f"{option} {word}: leave {option} out instead")
     switches = {name for name, hint in kinds.items() if hint is bool}
     if given := next((w for w in words if "=" in w and w.partition("=")[0].replace("_", "-") in switches), None):
