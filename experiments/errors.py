@@ -40,7 +40,7 @@ REPORT = "fault.txt"  # Name of the file of tracebacks in a results folder
 
 
 def is_told(error: BaseException) -> bool:
-    """Return whether an error says itself what is wrong and what to try; packages that are not loaded have raised none."""
+    """True if an error says itself what is wrong and what to try; packages that are not loaded have raised none."""
     roots: list[type] = [ExperimentError, OSError, MemoryError]
     for module, name in (("idbench.identify.errors", "IdentificationError"), ("idbench.sim.errors", "BenchError")):
         if module in sys.modules:

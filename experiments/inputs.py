@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Any
 
+from idbench.experiments.identification.job import robot_of
 from idbench.experiments.identification.reading import file_of
 from idbench.experiments.requests import jobs
 from idbench.experiments.requests.table import request_keys
@@ -22,4 +23,6 @@ def files_of(asked: Any) -> tuple[Path, ...]:
             if what and each and (what != "name" or Path(each).suffix):
                 path = Robot.path(each) if what == "robot" else file_of(each) if what == "log" else Path(each)
                 found[path.absolute()] = None
+    if isinstance(asked, jobs.IdentifyRequest):  # that of the run, where none is named
+        found[Robot.path(robot_of(asked)).absolute()] = None
     return tuple(found)

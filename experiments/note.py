@@ -22,6 +22,6 @@ class Note(str):
         return made
 
 
-def option_of(sentence: str) -> str:
-    """The option that mends what a sentence says; empty if there is none."""
-    return sentence.option if isinstance(sentence, Note) else ""
+def noted(sentence: str) -> Note:
+    """A sentence with its marks; without any if it has none."""
+    return sentence if isinstance(sentence, Note) else Note(sentence)

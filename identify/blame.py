@@ -20,7 +20,7 @@ LIBRARIES = frozenset({"numpy", "scipy", "mujoco", "pyarrow", "ruckig", "pydanti
 
 
 def is_mistake(error: BaseException) -> bool:
-    """Return whether an error is no interruption or termination: those are meant, and a plug-in has no say in them."""
+    """True if an error is no interruption or termination: those are meant, and a plug-in has no say in them."""
     meant = isinstance(error, KeyboardInterrupt) or _root(type(error).__module__) in OURS
     return isinstance(error, Exception) or not meant
 

@@ -184,7 +184,7 @@ class PluginTable(Table[T]):
 
 
 def _alike(made: object, other: object) -> bool:
-    """Return whether a table has an object under another's name: the same, or equal to what a class makes by itself."""
+    """True if a table has an object under another's name: the same, or equal to what a class makes by itself."""
     try:
         if isinstance(other, type):
             return type(made) is other and bool(made == other())

@@ -154,7 +154,7 @@ def _docstrings(cls: type) -> dict[str, str]:
 
 
 def for_all_joints(cls: type, key: str) -> bool:
-    """Return whether a single value of this setting holds for all joints."""
+    """True if a single value of this setting holds for all joints."""
     return any(isinstance(m, BeforeValidator) for m in fields_of(cls)[key].metadata)
 
 

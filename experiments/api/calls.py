@@ -208,7 +208,7 @@ def several(given: Any) -> tuple[Any, ...]:
 
 
 def _files(logs: Sequence[Any]) -> bool:
-    """Return whether logs are files; raise ExperimentError if some are and others are not."""
+    """True if logs are files; raise ExperimentError if some are and others are not."""
     files = [isinstance(log, str | Path) for log in logs]
     if any(files) and not all(files):
         raise ExperimentError("give logs as files, or as MotionLog: not some of each")

@@ -4,6 +4,7 @@ import os
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from importlib.metadata import version
 
 from idbench.experiments.cli.interruption import INTERRUPTED, Notice, TerminatedError, importing, noticing, terminating
 from idbench.experiments.errors import ExperimentError, is_told, reason, report, visible
@@ -47,7 +48,7 @@ def run(args: Sequence[str] | None = None) -> int:
         _require_memory()
         with terminating(), noticing() as notice:
             if words == ["--version"]:
-                _print(f"idbench {_version()}")
+                _print(f"idbench {version('idbench')}")
             elif not words:
                 _print(OVERVIEW)
             else:
@@ -102,12 +103,6 @@ def _do(command: Callable[[], None]) -> None:
             f"what was called ended the process ({type(ended).__name__}: {ended}) before the command was done: a plug-in must "
             "return, or raise an error; what is printed above is complete, and nothing else"
         ) from ended
-
-
-def _version() -> str:
-    from importlib.metadata import version
-
-    return version("idbench")
 
 
 def _print(text: str) -> None:

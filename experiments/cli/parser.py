@@ -3,9 +3,9 @@
 import ast
 import re
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import MISSING, dataclass, field, fields, is_dataclass
 from difflib import get_close_matches
-from inspect import Parameter as Signature
 from inspect import cleandoc, getsource
 from itertools import pairwise, takewhile
 from pathlib import Path
@@ -59,7 +59,7 @@ def joined(text: str) -> str:
 
 
 def texts_of(options: type) -> dict[str, str]:
-    """What fields of a dataclass are, by the texts below them."""
+    """Texts below the fields of a dataclass, by the fields."""
     found = dict[str, str]()
     for owner in filter(is_dataclass, reversed(options.__mro__)):
         (made,) = ast.parse(dedent(getsource(owner))).body
@@ -83,15 +83,10 @@ def _marked(options: type, shown: Container[str] | None, group: Group) -> type:
             annotations[each.name] = Annotated[_marked(inner, shown, of), Parameter(name="*")]
             space[each.name] = field(default_factory=get_args(annotations[each.name])[0], kw_only=True)
             continue
-        plain, visible = _plain(hint), shown is None or each.name in shown
+        plain, whole = _plain(hint), _stated(hint) is int
         several = get_origin(plain) is tuple
-        whole = _stated(hint) is int
         parameter = Parameter(
-            name=[
-                *([] if word.positional else [f"--{word.option or each.name.replace('_', '-')}"]),
-                *filter(None, [word.short]),
-            ]
-            or None,
+            name=_names(each.name, word) or None,
             help=texts.get(each.name),
             metavar=word.metavar or None,
             negative=None if plain is bool and not word.flag else (),
@@ -101,7 +96,7 @@ def _marked(options: type, shown: Container[str] | None, group: Group) -> type:
             allow_repeating=None if several else True,
             json_list=False,
             group=group,
-            show=visible,
+            show=shown is None or each.name in shown,
             show_default=_default if each.default not in (None, (), "", MISSING, False) else False,
             show_choices=get_origin(plain) is Literal,
         )
@@ -116,8 +111,8 @@ def _marked(options: type, shown: Container[str] | None, group: Group) -> type:
 def _stated(hint: Any) -> Any:
     """The type of a value that is given: without None."""
     plain = _plain(hint)
-    union = get_origin(plain) in (Union, UnionType)
-    return next(t for t in (get_args(plain) if union else (plain,)) if t is not type(None))
+    kinds = get_args(plain) if get_origin(plain) in (Union, UnionType) else (plain,)
+    return next(kind for kind in kinds if kind is not type(None))
 
 
 def _default(value: Any) -> str:
@@ -176,17 +171,15 @@ def parsed(words: Sequence[str], commands: Mapping[str, type], description: str)
             print(f"{_hidden(options, essential)} more options: idbench {name} {ALL}")  # noqa: T201  # as the library prints
         return None
     _require_once(rest)
-    _require_no_value(rest, options)
+    _require_values(rest, options)
     try:
-        return _made(app, rest)
-    except MissingArgumentError as error:
-        if error.argument is None or error.keyword or rest[-1:] == [] or rest[-1].startswith("-"):
-            raise ExperimentError(_said(error, words, options)) from None
-        # An option of several words has taken the last one, which has no name.
         try:
-            return _made(app, [rest[-1], *rest[:-1]])
-        except CycloptsError:
-            raise ExperimentError(_said(error, words, options)) from None
+            return _made(app, rest)
+        except MissingArgumentError:
+            if rest and not rest[-1].startswith("-"):
+                with suppress(CycloptsError):  # an option of several words has taken the last one, which has no name
+                    return _made(app, [rest[-1], *rest[:-1]])
+            raise
     except CycloptsError as error:
         raise ExperimentError(_said(error, words, options)) from None
 
@@ -222,8 +215,8 @@ def _require_once(words: Sequence[str]) -> None:
         raise ExperimentError(f"{twice} is given twice: give it once, and all its values if it takes several: {once}")
 
 
-def _require_no_value(words: Sequence[str], options: type) -> None:
-    """Raise ExperimentError if an option that is on or off is given a value, or another the word none."""
+def _require_values(words: Sequence[str], options: type) -> None:
+    """Raise ExperimentError if a switch is given a value, or the word none stands for a value that is left out."""
     kinds = dict(_options(options))
     for option, word in pairwise(words):
         kind = kinds.get(option, str)
@@ -250,7 +243,7 @@ def _said(error: CycloptsError, words: Sequence[str], options: type) -> str:
     if isinstance(error, CoercionError) and error.token is not None and get_origin(kind) is Literal:
         value, known = error.token.value, [str(x) for x in get_args(kind)]
         said = f"{called} {value}: no such choice{did_you_mean(value, known)}; known: {', '.join(sorted(known))}"
-    elif isinstance(error, CoercionError) or _given(called, words):
+    elif isinstance(error, CoercionError) or _given(called, words[1:]):
         given = " ".join([called, *_given(called, words)])
         said = f"{given}: give {_wanted(argument)}: {' '.join(str(argument.parameter.help).split())}"
     elif isinstance(error, MissingArgumentError) and not argument.tokens and not error.keyword:
@@ -269,7 +262,7 @@ def did_you_mean(word: str, known: Iterable[str]) -> str:
 
 
 def _called(argument: Any) -> str:
-    named = argument.field_info.kind is Signature.KEYWORD_ONLY
+    named = argument.field_info.kind.name == "KEYWORD_ONLY"
     return str(argument.name) if named else str(argument.keys[-1] if argument.keys else argument.name)
 
 
@@ -306,6 +299,12 @@ def _options(command: Any) -> Iterator[tuple[str, Any]]:
         if is_dataclass(hint):
             yield from _options(hint)
         elif not word.positional:
-            name = word.option or each.name.replace("_", "-")
-            names = [f"--{name}", *filter(None, [word.short]), *([f"--no-{name}"] if hint is bool and not word.flag else [])]
-            yield from ((option, hint) for option in names)
+            names = _names(each.name, word)
+            off = [f"--no-{names[0][2:]}"] if hint is bool and not word.flag else []
+            yield from ((option, hint) for option in (*names, *off))
+
+
+def _names(field_name: str, word: Word) -> list[str]:
+    """Names of an option; none of what is typed without a name."""
+    own = [] if word.positional else [f"--{word.option or field_name.replace('_', '-')}"]
+    return [*own, *filter(None, [word.short])]

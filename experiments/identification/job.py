@@ -84,7 +84,7 @@ def robot_of(asked: IdentifyRequest) -> str:
 
 
 def assumes_the_robot(asked: IdentifyRequest) -> bool:
-    """Return whether nobody says of which robot the log is: neither a request nor the folder of a run."""
+    """True if nobody says of which robot the log is: neither a request nor the folder of a run."""
     return asked.robot is None and "robot" not in stated_by(asked.log[0])
 
 
@@ -130,7 +130,7 @@ def truth_of(asked: IdentifyRequest, request: Request) -> dict[str, float] | Non
 
 
 def chooses_band(asked: IdentifyRequest) -> bool:
-    """Return whether the band is to suit the logs: nothing states it."""
+    """True if the band is to suit the logs: nothing states it."""
     return asked.cutoff is None and asked.chain_file is None and asked.chain == CHAIN
 
 

@@ -80,7 +80,7 @@ class SimulatedLogs:
         return replace(log, tau=tau, torque=torque).part(edge, log.samples - edge)
 
     def _evident(self, logs: Sequence[MotionLog], request: Request) -> bool:
-        """Return whether the file's parameters explain the torques so much better."""
+        """True if the file's parameters explain the torques so much better."""
         try:
             before, after = (self._left(each, request) for each in (logs, [self._acting(log) for log in logs]))
         except IdentificationError:  # of a log that cannot be identified, the fit says why
@@ -260,7 +260,7 @@ def _require_other_samples(every: Sequence[ReadLog]) -> None:
 
 
 def within(one: MotionLog, other: MotionLog) -> bool:
-    """Return whether a log is a part of another, or the other of it."""
+    """True if a log is a part of another, or the other of it."""
     short, long = sorted((one, other), key=lambda log: log.samples)
     starts = np.flatnonzero((long.q[: long.samples - short.samples + 1] == short.q[0]).all(axis=1)) if short.n == long.n else ()
     return any(np.array_equal(long.q[k : k + short.samples], short.q) for k in starts[:MOST_STARTS])

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from idbench.experiments.identification.fit import Fit
-from idbench.experiments.note import Note, option_of
+from idbench.experiments.note import Note, noted
 from idbench.identify import Array, Joint, KinematicTree, MotionLog, Problem
 from idbench.identify.basis.block import FRICTION, RIGID, Kind
 from idbench.identify.data.jumps import Jump, jumps
@@ -18,7 +18,7 @@ PARTS: dict[str, frozenset[Kind]] = {"friction": FRICTION, "links and rotors": R
 
 
 def unlike_file(fit: Fit) -> list[str]:
-    """Return whether torques are far from what the robot's file says of the same motion, as those in other units are.
+    """True if torques are far from what the robot's file says of the same motion, as those in other units are.
 
     If only friction is, or only what has inertia, that is said: the file has placeholders.
     """
@@ -86,7 +86,7 @@ def warnings_of_log(log: MotionLog, tree: KinematicTree) -> list[str]:
         if reason:
             by_reason.setdefault(reason, []).append(f"{joint.name} goes from {ends[0]:.4g} to {ends[1]:.4g}")
     return found + [
-        Note(f"{', '.join(each)}{reason}", option=option_of(reason)) for reason, each in by_reason.items()
+        Note(f"{', '.join(each)}{reason}", option=noted(reason).option) for reason, each in by_reason.items()
     ]  # all joints in degrees are one line
 
 
@@ -97,7 +97,7 @@ def unchanging(log: MotionLog, tree: KinematicTree) -> list[str]:
 
 
 def unusable(log: MotionLog) -> bool:
-    """Return whether positions of a log jump, so that no advice can be drawn from it."""
+    """True if positions of a log jump, so that no advice can be drawn from it."""
     return bool(_jumps(log))
 
 
@@ -147,7 +147,7 @@ def _reason(joint: Joint, ends: Array) -> str:
 
 
 def warnings_of_base(tree: KinematicTree) -> list[str]:
-    """Return whether a robot looks like one that is not fixed to the ground: legs and rotors start there."""
+    """True if a robot looks like one that is not fixed to the ground: legs and rotors start there."""
     first = [joint.name for joint in tree.joints if joint.parent == GROUND]
     if len(first) == 1:
         return []

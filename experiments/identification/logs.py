@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from idbench.experiments.note import Note, noted
 from idbench.identify import Array, Basis, Chain, IdentificationError, MotionLog, TorqueChannel, encoder_steps
 from idbench.identify.data.jumps import white_noise
 from idbench.identify.data.log_columns import LogColumns
@@ -108,7 +109,11 @@ def delay_method(delay: str | None) -> str | None:
 
 LEAST = 0.05  # Share of a sample by which a delay must move to matter
 
-WITH_LAWS = "torque delay with the laws of friction that were chosen"
+WITH_LAWS = "delay with laws"  # Mark of the note on a delay that was estimated again, which a later one replaces
+
+
+def _with_laws(said: object) -> Note:
+    return Note(f"torque delay with the laws of friction that were chosen: {said}", about=WITH_LAWS)
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,7 +145,7 @@ class Logs:
             try:
                 found[meaning] = estimated([log for log in self.fitted if log.torque.meaning == meaning], basis, chain)
             except IdentificationError as error:
-                return replace(self, notes=(*self._notes, f"{WITH_LAWS}: {error}")), False
+                return replace(self, notes=(*self._notes, _with_laws(error))), False
         said = ", ".join(each.words for each in found.values())
         first = next(iter(found.values()))
         moved = any(_moved(log, found[log.torque.meaning]) for log in self.fitted)
@@ -150,7 +155,7 @@ class Logs:
             held_out={
                 name: with_delay(log, found.get(log.torque.meaning, first)) for name, log in (self.held_out or {}).items()
             },
-            notes=(*self._notes, f"{WITH_LAWS}: {said}"),
+            notes=(*self._notes, _with_laws(said)),
         )
         return delayed, moved
 
@@ -166,7 +171,7 @@ class Logs:
     @property
     def _notes(self) -> tuple[str, ...]:
         """What was noted but for delays with other laws."""
-        return tuple(note for note in self.notes if not note.startswith(WITH_LAWS))
+        return tuple(note for note in self.notes if noted(note).about != WITH_LAWS)
 
     @property
     def longest_name(self) -> str:

@@ -25,7 +25,7 @@ NOTHING = 1e-12
 
 
 def are_poses(path: Path, columns: LogColumns, *, stated: bool) -> bool:
-    """Return whether rows are poses at rest: that is stated, or they are far apart in time and do not continue each other.
+    """True if rows are poses at rest: that is stated, or they are far apart in time and do not continue each other.
 
     Raises
     ------

@@ -197,7 +197,7 @@ class HeldOut:
         return {model: found[other] for model, other in same.items()}
 
     def _agree(self, model: str, other: str) -> bool:
-        """Return whether the parameters of two models are the same, far within their standard errors."""
+        """True if the parameters of two models are the same, far within their standard errors."""
         one, two = self.fit.estimates[model], self.fit.estimates[other]
         return bool((np.abs(one.X - two.X) <= SAME * one.standard_errors).all())
 

@@ -27,7 +27,7 @@ from idbench.experiments.judgement.warnings import (
     warnings_of_result,
     wrong_sign,
 )
-from idbench.experiments.note import Note, option_of
+from idbench.experiments.note import Note, noted
 from idbench.experiments.text import error_percentage
 from idbench.identify import IdentificationError, RangeError, WeightedLeastSquares, estimate, validate
 from idbench.identify.judge.delay import estimate_delay, nearby_delay
@@ -172,7 +172,7 @@ def checks(judgement: Judgement, *, delay: bool, trials: bool = True) -> dict[st
         # Friction absorbs a wrong delay, and the verdict may be good: the log itself is asked.
         found[DELAY] += delay_advice(result) if delay else ()
         found[MODEL] += Remedies(hardest).options() if trials and not judgement.good else ()
-    late = [("delay", "torque", None)] if any(map(option_of, found[DELAY])) else []
+    late = [("delay", "torque", None)] if any(noted(advice).option for advice in found[DELAY]) else []
     of_model = (c for c in result.diagnosis or () if (c.suspect.cause, c.suspect.of, c.suspect.joint) not in late)
     found[MODEL] += [cause.advice for cause in of_model]
     return found
@@ -186,7 +186,7 @@ def warnings_of_logs(judgement: Judgement) -> Iterator[str]:
     every += [(f"{name}: ", log) for name, log in (logs.held_out or {}).items()]
     untested = judgement.fit.diagnosis is None
     return (
-        Note(before + warning, option=option_of(warning))
+        Note(before + warning, option=noted(warning).option)
         for before, log in every
         for warning in (*warnings_of_log(log, tree), *(unchanging(log, tree) if untested else ()))
     )

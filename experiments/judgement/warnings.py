@@ -214,7 +214,7 @@ def wrong_sign(fit: Fit) -> list[Note]:
 
 
 def _surely_negative(x: float, sigma: float) -> bool:
-    """Return whether a value is negative by the estimator's own sigma: an impossible value is a mistake, not an error."""
+    """True if a value is negative by the estimator's own sigma: an impossible value is a mistake, not an error."""
     return x < -2 * sigma
 
 

@@ -184,7 +184,7 @@ class LoadJudgement:
 
 
 def negative_mass(payload: PayloadEstimate) -> bool:
-    """Return whether the estimated mass is significantly below zero."""
+    """True if the estimated mass is significantly below zero."""
     return any(name == "ML" and x < -SURE * s for name, x, s in zip(payload.names, payload.X, payload.sigma, strict=True))
 
 

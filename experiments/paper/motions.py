@@ -52,7 +52,7 @@ class Errors:
         return np.asarray(np.percentile(self.percent[model], q, axis=0))
 
     def explained(self, model: str) -> npt.NDArray[np.bool_]:
-        """Return whether the paper's error of each parameter lies inside the band, shape (p,)."""
+        """True where the paper's error of each parameter lies inside the band, shape (p,)."""
         low, high = (self.percentiles(model, q) for q in BAND)
         paper = np.array(PAPER[model].error)
         # The paper prints three decimals: 0.001 may be 0.0005 to 0.0015.

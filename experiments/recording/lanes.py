@@ -123,5 +123,5 @@ def joint_states(qd: Array, slow: float, limited: Array | None, before: float) -
 
 
 def mask_states(weight: Array) -> npt.NDArray[np.str_]:
-    """Return whether an instant is used, from its weight, shape (time,)."""
+    """True where an instant is used, from its weight, shape (time,)."""
     return np.where(weight == 0, "masked", np.where(weight < 1, "partly", "used"))

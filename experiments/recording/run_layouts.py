@@ -216,7 +216,7 @@ def residuals(shelf: Shelf) -> list[Part]:
 
 
 def _many(shelf: Shelf) -> bool:
-    """Return whether so many identifications lie over each other that a legend is needed to switch them."""
+    """True if so many identifications lie over each other that a legend is needed to switch them."""
     return len(shelf.methods) > FEW
 
 

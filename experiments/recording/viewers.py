@@ -34,7 +34,7 @@ def address(url: str) -> tuple[str, int]:
 
 
 def answers(url: str) -> bool:
-    """Return whether somebody takes connections there."""
+    """True if somebody takes connections there."""
     try:
         with closing(socket.create_connection(address(url), 2.0)):
             return True

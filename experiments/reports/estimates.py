@@ -12,7 +12,7 @@ from idbench.experiments.identification.fit import Fit
 from idbench.experiments.judgement.held_out import FAIR, GOOD, Verdict
 from idbench.experiments.judgement.judgement import Judgement
 from idbench.experiments.judgement.warnings import DELAY, FLAGS, LOG, doubtful, used
-from idbench.experiments.note import option_of
+from idbench.experiments.note import noted
 from idbench.experiments.text import WORTHLESS, error_percentage, number, percent, relative, with_unit
 from idbench.identify import Estimate
 from idbench.identify.arrays import Array
@@ -157,9 +157,9 @@ def conclusion(judgement: Judgement, warnings: Mapping[str, Sequence[str]]) -> t
 
     What is wrong with the log, and has an option that mends it, comes before mistakes of the model: it may cause them.
     """
-    of_log = next((warning for warning in warnings.get(LOG, ()) if option_of(warning)), "")
+    of_log = next((warning for warning in warnings.get(LOG, ()) if noted(warning).option), "")
     first = next((found[0] for found in warnings.values() if found), "")
-    late = next(filter(None, map(option_of, warnings.get(DELAY, ()))), "")
+    late = next((option for warning in warnings.get(DELAY, ()) if (option := noted(warning).option)), "")
     if late and (causes := judgement.fit.diagnosis) and causes[0].suspect.cause == "delay":
         return _found(judgement, causes), f"next: {late}"
     return _found(judgement, [] if of_log else judgement.fit.diagnosis or []), _next(judgement, of_log, first)

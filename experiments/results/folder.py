@@ -202,15 +202,15 @@ class ResultsFolder:
         return {name for name in manifest.files if self._writes(name) and manifest.owns(name)}
 
     def _writes(self, name: str) -> bool:
-        """Return whether results may have a file of that name."""
+        """True if results may have a file of that name."""
         return any(fnmatch(name, pattern) for pattern in FILES[self.experiment])
 
     def _reads(self, target: Path) -> bool:
-        """Return whether a file is one that the command reads."""
+        """True if a file is one that the command reads."""
         return any(target.exists() and path.exists() and target.samefile(path) for path in self.read)
 
     def goes_beside(self, path: Path, option: str) -> bool:
-        """Return whether a further file goes beside the results; raise ResultsError if it has the name of one of them."""
+        """True if a further file goes beside the results; raise ResultsError if it has the name of one of them."""
         if path.absolute().parent != self.out.absolute():
             return False
         if self._writes(path.name) or path.name == NAME:

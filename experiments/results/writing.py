@@ -219,7 +219,7 @@ class Manifest:
         return cls(folder, files)
 
     def owns(self, name: str) -> bool:
-        """Return whether a file is there and as idbench wrote it."""
+        """True if a file is there and as idbench wrote it."""
         path = self.folder / name
         return name in self.files and path.is_file() and digest(path) in self.files[name].digests
 

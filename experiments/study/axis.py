@@ -199,7 +199,7 @@ class Method:
         return self.chain_name, self.estimator_name
 
     def fits(self, settings: Mapping[str, Any]) -> bool:
-        """Return whether this method has the values of the axes, where they are given."""
+        """True if this method has the values of the axes, where they are given."""
         return all(settings.get(s.axis.field, s.label) == s.label for s in self.settings)
 
 

@@ -84,7 +84,7 @@ def study_answer(study: Study, found: Sequence[Cell]) -> str:
 
 
 def _compares(study: Study) -> bool:
-    """Return whether a study compares the models over kinds of noise, by equal numbers of rows.
+    """True if a study compares the models over kinds of noise, by equal numbers of rows.
 
     It has too many methods for a test of every pair: the draws of a permutation test grow with the number of pairs.
     """

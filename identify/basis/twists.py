@@ -30,7 +30,7 @@ ZERO = Vector(0.0, 0.0, 0.0)  # of a twist that has no such part
 
 
 def is_zero(a: Term) -> bool:
-    """Return whether a term is zero at all times."""
+    """True if a term is zero at all times."""
     return isinstance(a, float) and a == 0.0
 
 

@@ -261,7 +261,7 @@ def _by_values(path: Path, table: LogTable) -> LogLayout:
 
 
 def _is_derivative(table: LogTable, q: tuple[str, ...], qd: tuple[str, ...]) -> bool:
-    """Return whether most columns are the derivatives of others, up to a factor that they share."""
+    """True if most columns are the derivatives of others, up to a factor that they share."""
     slopes, fits = list[float](), list[bool]()
     for a, b in zip(q, qd, strict=True):
         width = max(1, min(len(table.columns[a]) // 50, 25))

@@ -202,7 +202,7 @@ def matching(pattern: str, names: Sequence[str]) -> list[tuple[str, str]]:
 
 
 def _is_layout(path: Path) -> bool:
-    """Return whether a file beside a log says what its columns are: a robot or a scenario may have the same name."""
+    """True if a file beside a log says what its columns are: a robot or a scenario may have the same name."""
     try:
         return bool({"t", "q", "qd", "tau", "torque", "rows"} & set(tomllib.loads(path.read_text(encoding="utf-8"))))
     except (OSError, ValueError, RecursionError):

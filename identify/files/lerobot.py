@@ -19,7 +19,7 @@ def data_file(folder: Path) -> Path:
 
 
 def is_data_set(path: Path) -> bool:
-    """Return whether a folder is a data set of LeRobot."""
+    """True if a folder is a data set of LeRobot."""
     return path.is_dir() and (path / INFO).is_file()
 
 

@@ -74,7 +74,7 @@ def factor(quantity: str, unit: str) -> float:
 
 
 def needs_gain(unit: str) -> bool:
-    """Return whether an effort in this unit is no torque."""
+    """True if an effort in this unit is no torque."""
     return _plain(unit) in [_plain(name) for name in NEED_GAIN]
 
 

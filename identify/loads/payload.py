@@ -183,7 +183,7 @@ def _as_link(robot: LoadedRobot) -> tuple[Array, Array]:
 
 
 def _repeated(one: MotionLog, other: MotionLog) -> bool:
-    """Return whether two logs are of one motion."""
+    """True if two logs are of one motion."""
     return one.q.shape == other.q.shape and bool(np.sqrt(np.mean((one.q - other.q) ** 2)) < REPEATED)
 
 

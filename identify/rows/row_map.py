@@ -189,7 +189,7 @@ class RowMap:
         return in_order(self.outside * self.kernel.apply(self.inside * y))
 
     def noisy_as(self, other: Self) -> bool:
-        """Return whether noise of the log reaches these rows as it does those of the map of another model."""
+        """True if noise of the log reaches these rows as it does those of the map of another model."""
         if self is other:
             return True
         if (

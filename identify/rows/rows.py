@@ -21,7 +21,7 @@ LONG = 1e7  # Samples times joints squared, of all logs of a fit, beyond which r
 
 
 def is_long(logs: Sequence[MotionLog]) -> bool:
-    """Return whether the rows of a fit are too many to be kept."""
+    """True if the rows of a fit are too many to be kept."""
     return all(log.q.ndim == 2 for log in logs) and _size(logs) > LONG
 
 

@@ -117,7 +117,7 @@ class ServoDrive(AbstractDrive):
         return np.where(self.is_off(t), np.zeros_like(t), 1.0)
 
     def is_off(self, t: Any) -> Any:
-        """Return whether torque is off at an instant, or at instants [s]."""
+        """True if torque is off at an instant, or at instants [s]."""
         off: Any = False
         for first, last in self.off:
             off = off | ((first <= t) & (t < last))

@@ -118,7 +118,7 @@ class Watcher:
         self._taken.append(step)
 
     def due(self, final: int) -> bool:
-        """Return whether a stretch is complete when `final` samples are."""
+        """True if a stretch is complete when `final` samples are."""
         return final - self._told >= self._samples
 
     def tell(self, final: int, planned: Reference, channels: Mapping[str, Array], drive: AbstractAmplifier) -> None:

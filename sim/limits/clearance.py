@@ -105,7 +105,7 @@ class Clearance:
         return np.array(pairs, dtype=np.intp).reshape(-1, 2)
 
     def _neighbours(self, one: int, two: int) -> bool:
-        """Return whether two bodies belong to one link, or to two with a joint between them; what stands around is nobody's."""
+        """True if two bodies belong to one link, or to two with a joint between them; what stands around is nobody's."""
         m = self._model
         if m.body_weldid[one] == m.body_weldid[two]:
             return True

@@ -179,7 +179,7 @@ def _document(name: str, mounting: Mounting) -> ElementTree.Element:
 
 
 def _made(path: Path) -> bool:
-    """Return whether a file is none of MJCF, which is made of it."""
+    """True if a file is none of MJCF, which is made of it."""
     return path.suffix == TABLE or "<robot" in path.read_text(encoding="utf-8")
 
 

@@ -148,7 +148,7 @@ def _mend(root: ElementTree.Element) -> Iterator[str]:
 
 
 def _carries(name: str, links: dict[str, ElementTree.Element], root: ElementTree.Element) -> bool:
-    """Return whether something with mass is welded to a link."""
+    """True if something with mass is welded to a link."""
     welded = [_name(j, "child") for j in root.iter("joint") if j.get("type") == "fixed" and _name(j, "parent") == name]
     for child in welded:
         inertial = links[child].find("inertial") if child in links else None

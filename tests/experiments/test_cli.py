@@ -109,6 +109,16 @@ def test_a_reader_that_goes_away_is_no_error(tmp_path, start):
     assert process.wait() == 0
 
 
+def test_the_last_word_is_that_without_a_name_where_one_is_needed(capsys):
+    """Options of several words take all that follows; a switch may stand twice."""
+    assert main(["robot", "--add", "offset", "two_link"]) == 0
+    after = capsys.readouterr().out
+    assert main(["robot", "two_link", "--add", "offset"]) == 0
+    assert capsys.readouterr().out == after
+    assert main(["list", "--json", "--json"]) == 2
+    assert main(["run", "ideal", "-v", "-v", "--no-rerun", "--index", "0"]) == 2  # --index needs --from: words are read
+
+
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
 def test_shells_complete_every_command_and_its_options(shell, capsys):
     assert main(["completion", shell]) == 0

@@ -13,6 +13,7 @@ from idbench.experiments.errors import ResultsError
 from idbench.experiments.results.folder import ResultsFolder
 from idbench.experiments.results.writing import HIDDEN, NAME, Manifest, new_file, write_text
 from idbench.identify.files.log_file import read_log, write_log
+from idbench.sim.robot.robot import Robot
 
 RUN = "run", "ideal", "--no-rerun", "--out"
 
@@ -226,14 +227,22 @@ def test_a_log_with_gaps_replaces_none_of_its_pieces(tmp_path, complaint, log):
 
 
 def test_a_payload_does_not_replace_the_robots_own_file(tmp_path, complaint, logs):
-    from idbench.sim.robot.robot import Robot
-
     own = tmp_path / "p.xml"
     own.write_text(Robot.path("puma560").read_text())
     words = "payload", str(logs / "first.parquet"), "--unloaded", str(logs / "second.parquet"), "--robot", str(own)
     for force in ([], ["--force"]):
         assert "is a file that this command reads" in complaint(*words, "--write-mjcf", str(own), *force)
     assert own.read_text() == Robot.path("puma560").read_text()
+
+
+def test_the_robot_of_a_run_that_is_identified_is_not_replaced(tmp_path, complaint):
+    """No --robot: the folder of the run states it."""
+    own = tmp_path / "arm.xml"
+    own.write_text(Robot.path("scara").read_text())
+    assert main(["run", "ideal", "--robot", str(own), "--no-rerun", "--out", str(tmp_path / "run")]) == 0
+    words = "identify", str(tmp_path / "run"), "--force", "--write-mjcf", str(own)
+    assert "is a file that this command reads" in complaint(*words)
+    assert own.read_text() == Robot.path("scara").read_text()
 
 
 def test_folders_of_killed_processes_go_and_those_of_others_stay(tmp_path):

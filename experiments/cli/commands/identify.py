@@ -21,7 +21,6 @@ from idbench.experiments.identification.job import (
     notes_of,
     read_options,
     request_of,
-    robot_of,
     summary_of,
 )
 from idbench.experiments.identification.logs import delay_method
@@ -31,7 +30,7 @@ from idbench.experiments.identification.robot_model import SCARA
 from idbench.experiments.inputs import files_of
 from idbench.experiments.judgement.judgement import Judgement, judge
 from idbench.experiments.judgement.remedies import checks
-from idbench.experiments.note import Note
+from idbench.experiments.note import noted
 from idbench.experiments.recording.audience import Audience
 from idbench.experiments.reports.estimates import conclusion, models_in_full, verdict_on
 from idbench.experiments.reports.printed import print_fit
@@ -41,7 +40,6 @@ from idbench.experiments.results.folder import ResultsFolder
 from idbench.experiments.results.page import COLORS, Page, new_page, shown, stages_of
 from idbench.experiments.results.writing import write_summary
 from idbench.identify.files.log_file import write_log
-from idbench.sim.robot.robot import Robot
 
 ASSUMED = f"no --robot was given, the shipped {SCARA} is assumed"
 
@@ -55,7 +53,7 @@ NOT_MADE_AGAIN = tuple(name for name in LEFT_OUT if name != "out")
 def identify(options: Identify) -> None:
     """Identify logs, judge the result, save and show it."""
     page, request = new_page(machine=options.json), request_of(with_own_parts(options))
-    command, read = command_of("identify", options, "log", NOT_MADE_AGAIN), (*files_of(options), Robot.path(robot_of(options)))
+    command, read = command_of("identify", options, "log", NOT_MADE_AGAIN), files_of(options)
     whole, log = command_of("identify", options, "log", LEFT_OUT, absolute=True), file_of(options.log[0]).absolute()
     folder = ResultsFolder(options.out, "identify", whole, options.force, read) if options.out else None
     require_targets(options, request.robot_model, folder, read)
@@ -141,7 +139,7 @@ def _followed(stack: ExitStack, options: Identify, request: Request, audience: A
 def _show_fit(page: Page, result: Fit, options: Identify, whole: tuple[str, ...]) -> None:
     """Show the estimates."""
     print_fit(page, result, ", ".join(map(str, options.log)), whole, verbose=options.verbose)
-    notes = (note for note in notes_of(result) if not (isinstance(note, Note) and note.about == DELAY_FOUND))
+    notes = (note for note in notes_of(result) if noted(note).about != DELAY_FOUND)
     for note in (*notes, *([ASSUMED] if assumes_the_robot(options) else [])):
         page.print(Text(note), soft_wrap=True)
     page.show()

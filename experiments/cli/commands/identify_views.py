@@ -79,7 +79,7 @@ def recording(shown: Shown, attempts: Attempts) -> None:
 
 
 def has_recording(run: Path) -> bool:
-    """Return whether a log is the folder of a run with a recording, to which layers can be added."""
+    """True if a log is the folder of a run with a recording, to which layers can be added."""
     return (run / RECORDING).is_file()
 
 

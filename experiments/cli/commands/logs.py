@@ -132,7 +132,7 @@ def _print_facts(page: Page, facts: LogFacts, unit: str) -> None:
 
 
 def _decimal(step: float) -> bool:
-    """Return whether a step is that to which a file rounds."""
+    """True if a step is that to which a file rounds."""
     return abs(log10(step) - round(log10(step))) < ROUNDED
 
 
