@@ -84,8 +84,8 @@ def row_noise(left: Instants, signals: Signals, chain: Chain) -> Array:
     length = min(left.residual.shape[-1], round(fs / RESOLUTION))
     f, S = welch(left.residual * left.weight, fs, length)
     S = S / np.maximum(np.mean(left.weight**2, axis=-1, keepdims=True), 1e-300)
-    passed = gain_of(chain.operator.response(fs), f, fs)
-    kinds = np.stack([gain_of(impulse, f, fs) ** 2 for impulse in _impulses(signals, chain)])
+    passed = gain_of(chain.operator.response(fs), length)
+    kinds = np.stack([gain_of(impulse, length) ** 2 for impulse in _impulses(signals, chain)])
     above = (passed < QUIET * passed[0]) & (f > f[np.argmax(passed < QUIET * passed[0])]) & (f < 0.95 * fs / 2)
     above &= (kinds > FAINT * kinds.max(axis=1, keepdims=True)).any(axis=0)
     if np.count_nonzero(above) < MIN_FREQUENCIES:

@@ -32,7 +32,7 @@ def noise_spectra(problem: Problem, levels: NoiseLevels, f: Array) -> tuple[Arra
     levels : NoiseLevels
         Of its log.
     f : Array
-        Frequencies [Hz].
+        Frequencies of `welch` [Hz], from 0 to fs / 2.
     """
     signals = problem.signals[0]
     fs, some = signals.fs, slice(0, None, max(1, int(signals.fs / EVERY)))
@@ -40,7 +40,7 @@ def noise_spectra(problem: Problem, levels: NoiseLevels, f: Array) -> tuple[Arra
     impulse[len(impulse) // 2] = 1.0
     zero = np.zeros_like(impulse)
     aligned, plain, rate, twice = (
-        gain_of(h, f, fs)
+        gain_of(h, round(fs / f[1]))
         for h in (
             signals.torque_adjoint(impulse),
             signals.position_adjoint((impulse, zero, zero)),

@@ -1,7 +1,6 @@
 """Spectra and filters of finite length, as SciPy has them: without half a second in which its package is loaded."""
 
 import numpy as np
-import numpy.typing as npt
 
 from idbench.identify.arrays import Array
 
@@ -32,10 +31,11 @@ def welch(x: Array, fs: float, length: int) -> tuple[Array, Array]:
     return np.asarray(np.fft.rfftfreq(length, 1 / fs), dtype=np.float64), np.asarray(power.mean(axis=-2))
 
 
-def gain_of(impulse: Array, f: Array, fs: float) -> Array:
-    """Return |H| = |sum of h_k exp(-2 pi i f k / fs)| of an impulse response at frequencies [Hz]."""
-    turns: npt.NDArray[np.complex128] = np.exp(-2j * np.pi * f[:, None] / fs * np.arange(len(impulse)))
-    return np.abs(turns @ impulse)
+def gain_of(impulse: Array, length: int) -> Array:
+    """Gain |H| = |sum of h_k exp(-2 pi i f k / fs)| of an impulse response at the frequencies of `welch`, f = i fs / length."""
+    whole = np.zeros(-(-len(impulse) // length) * length)
+    whole[: len(impulse)] = impulse
+    return np.abs(np.fft.rfft(whole.reshape(-1, length).sum(axis=0)))  # exp(-2 pi i f k / fs) has the period `length` in k
 
 
 def windowed_sinc(taps: int, cutoff: float, fs: float) -> Array:

@@ -107,7 +107,8 @@ def test_sigma_of_counts_alone_holds_the_truth(motion, bits, truth):
     """200 logs: errors over sigma are 1 within 0.1, and two sigma hold 93 to 98 % of the parameters.
 
     Not where the slowest motion meets 12 bits: the noise of its velocities is as large as they are. With 18 bits the
-    fastest series shows what the prefilter blurs of friction's jumps, three quarters of sigma: 1.3, and 88 %.
+    fastest series shows what the prefilter blurs of friction's jumps, three quarters of sigma: 1.3, and 88 %; 90 % with what
+    residuals say of the model.
     """
     if (motion, bits) == ("one period of 40 s", 12):
         pytest.skip("velocities are lost in counts")
@@ -120,4 +121,4 @@ def test_sigma_of_counts_alone_holds_the_truth(motion, bits, truth):
     blurred = (motion, bits) == ("periods of 10.28 s", 18)
     assert np.sqrt(np.mean(z**2)) == pytest.approx(1.0, abs=0.3 if blurred else 0.1)
     assert (0.88 if blurred else 0.93) < np.mean(np.abs(z) < 2) < 0.98
-    assert np.mean(np.abs(found.X - truth) < 2 * found.standard_errors) > 0.93
+    assert np.mean(np.abs(found.X - truth) < 2 * found.standard_errors) > (0.90 if blurred else 0.93)
