@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import ceil
 from typing import Any, Self, TypeVar
+from weakref import proxy
 
 import numpy as np
 
@@ -59,10 +60,17 @@ class State:
         return self.s(self.qd)
 
     def part(self, samples: slice) -> Self:
-        """Return the motion at some samples, with its velocities and accelerations there; its `s` knows no others."""
+        """Return the motion at some samples, with its velocities and accelerations there; its `s` knows no others.
+
+        All who ask for the same samples get the same motion, as long as the whole is there.
+        """
+        return self.shared((samples.start, samples.stop), lambda _: self._part(samples))
+
+    def _part(self, samples: slice) -> Self:
         conditions = {name: x[..., samples] for name, x in self.conditions.items()}
+        whole = proxy(self)  # a circle of references would outlive long pieces
         return replace(
-            self, q=self.q[..., samples], qd=self.qd[..., samples], s=lambda _: self.qdd[..., samples], conditions=conditions
+            self, q=self.q[..., samples], qd=self.qd[..., samples], s=lambda _: whole.qdd[..., samples], conditions=conditions
         )
 
     def shared(self, key: object, make: Callable[[Self], T]) -> T:
@@ -70,6 +78,13 @@ class State:
         if key not in self._shared:
             self._shared[key] = make(self)
         return self._shared[key]
+
+    def latest(self, key: object, make: Callable[[Self], T]) -> T:
+        """Return `make(self)`, kept until somebody asks with another `key`: what is large does not add up."""
+        kept = self._shared.get("latest")
+        if kept is None or kept[0] is not key:
+            kept = self._shared["latest"] = key, make(self)
+        return kept[1]
 
     def forget(self) -> None:
         """Drop what was computed once for all: it takes far more memory than the motion, and is not needed twice."""

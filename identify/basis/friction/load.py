@@ -78,7 +78,7 @@ class LoadFriction(AbstractJointLaw):
         """Return the torque that each joint carries [N m], shape (..., joint, time)."""
         if self.bodies is None or self.X is None:
             return state.qdd
-        return combined(state.shared(self.bodies.explicit, self.bodies.explicit), self.X, np.zeros(state.q.shape))
+        return combined(state.latest(self.bodies, self.bodies.explicit), self.X, np.zeros(state.q.shape))
 
     @property
     def is_nonlinear(self) -> bool:
