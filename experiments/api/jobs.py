@@ -15,7 +15,7 @@ from idbench.experiments.api.calls import PARTS, named, several
 from idbench.experiments.errors import ExperimentError, StudyError
 from idbench.experiments.excite.excited import Excited
 from idbench.experiments.excite.job import excited
-from idbench.experiments.loads.job import GainsFit, PayloadFit, gains_of, payload_of
+from idbench.experiments.loads.job import LoadFit, gains_of, payload_of
 from idbench.experiments.paper.job import table1_of, table2_of
 from idbench.experiments.paper.table1 import Table1
 from idbench.experiments.paper.table2 import Table2
@@ -130,12 +130,12 @@ def _store(described: Study, out: Path) -> Store:
     return store
 
 
-def fit_payload(log: Files, unloaded: Files = (), **keys: Any) -> PayloadFit:
+def fit_payload(log: Files, unloaded: Files = (), **keys: Any) -> LoadFit:
     """The payload, as `idbench payload` identifies it; files of logs, and its options by keyword."""
     return payload_of(_asked(jobs.PayloadRequest, "fit_payload", keys, log=log, unloaded=unloaded))
 
 
-def fit_gains(log: Files, unloaded: Files = (), **keys: Any) -> GainsFit:
+def fit_gains(log: Files, unloaded: Files = (), **keys: Any) -> LoadFit:
     """Return the torque constants of the drives, as `idbench gains` finds them; files of logs, and its options by keyword."""
     return gains_of(_asked(jobs.GainsRequest, "fit_gains", keys, log=log, unloaded=unloaded))
 

@@ -2,13 +2,17 @@
 
 import json
 import shlex
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from rich.console import Console
+from rich.text import Text
 
+from idbench.experiments.document import Document, Listing
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.friction_choice import chosen_friction, words
 from idbench.experiments.identification.job import read_options
@@ -16,7 +20,15 @@ from idbench.experiments.identification.load import in_band, load
 from idbench.experiments.identification.request import Request
 from idbench.experiments.identification.robot_model import RobotModel, absolute
 from idbench.experiments.loads.known_load import LoadJudgement, payload_parameters
-from idbench.experiments.loads.loads_text import gains_summary, payload_summary, print_gains, print_payloads
+from idbench.experiments.loads.loads_text import (
+    doubts_of_gains,
+    gains_summary,
+    gains_table,
+    payload_lines,
+    payload_summary,
+    payload_table,
+    words_of_payload,
+)
 from idbench.experiments.loads.simulated import Pairs
 from idbench.experiments.requests.jobs import GainsRequest, LoadRequest, PayloadRequest
 from idbench.experiments.text import printed
@@ -34,64 +46,54 @@ OF_GAINS = "sigma of the payload has no part of an error of the torque constants
 RUNS = 20  # Simulated pairs of runs
 
 
-@dataclass(frozen=True, eq=False)
-class PayloadFit:
-    """What the gripper holds, by one way or several."""
+@dataclass(frozen=True, eq=False, repr=False)
+class LoadFit:
+    """What logs with a payload and logs without it show: the payload, or the gains of the drives."""
 
     judgement: LoadJudgement
-    """The robot with its logs, to be judged."""
-    found: dict[str, PayloadEstimate | str]
-    """The payload by the name of the way, or why that gives none."""
-    notes: tuple[str, ...]
-    """What was read, done and assumed."""
+    """The robot with its logs, to be judged; by the gains that were found."""
+    found: Mapping[str, PayloadEstimate | str] | GainEstimate
+    """The payload by the name of the way, or why that gives none; or the gains."""
+    headline: str
+    """The same in a line."""
+    listing: Listing
+    """The same as a table."""
+    lines: tuple[str, ...]
+    """What belongs to the table, and what was read, done and assumed."""
+    content: Mapping[str, Any]
+    """What was found, for summary.json."""
+    leading: PayloadEstimate | None = None
+    """The payload by the first way that gives one."""
+    gains: Array | None = None
+    """The gains to read logs with: those that the logs show, otherwise the given ones, shape (joint,)."""
+    doubts: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    """Gains of which the payload says nothing."""
+
+    @cached_property
+    def document(self) -> Document:
+        """What the fit says, judged."""
+        judgement, robot = self.judgement, self.judgement.request.robot_model.name
+        warnings = judgement.warnings(self.leading)
+        word = judgement.word(warnings)
+        each = [(v.word, f"{log}: {v.word}: {'; '.join(v.reasons)}") for log, v in judgement.verdicts.items()]
+        verdicts = [(word, f"Result: {word}, {self.headline}"), *each]
+        return Document(self.listing.title, robot, verdicts, {**self.doubts, **warnings}, [self.listing], self.lines)
 
     def summary(self) -> dict[str, Any]:
-        """The summary.json of `idbench payload`, but for the names of files."""
-        doubts = self.judgement.warnings(self.leading)
-        judged = {"judgement": self.judgement.summary(self.judgement.word(doubts))}
-        return {"robot": self.judgement.request.robot_model.name, **payload_summary(self.found), **judged}
+        """The summary.json of the command, but for the names of files."""
+        return {**self.content, "judgement": self.judgement.summary(self.document.verdicts[0][0])}
+
+    def show(self, console: Console) -> None:
+        """Print what was found."""
+        self.listing.show(console)
+        for line in self.lines:
+            console.print(Text(line), soft_wrap=True)
 
     def __repr__(self) -> str:
-        joints = self.judgement.request.robot_model.robot.joints
-        return printed(lambda console: print_payloads(console, self.found, joints[-1]))
-
-    @property
-    def leading(self) -> PayloadEstimate:
-        """The payload by the first way that gives one."""
-        return next(p for p in self.found.values() if isinstance(p, PayloadEstimate))
+        return printed(self.show)
 
 
-@dataclass(frozen=True, eq=False)
-class GainsFit:
-    """The torque constants of the drives, gears included."""
-
-    judgement: LoadJudgement
-    """The robot with its logs, to be judged by the gains that were found."""
-    found: GainEstimate
-    """The gains."""
-    given: Array
-    """Those with which the logs were read, shape (joint,)."""
-    notes: tuple[str, ...]
-    """What was read, done and assumed."""
-
-    def summary(self) -> dict[str, Any]:
-        """The summary.json of `idbench gains`, but for the names of files."""
-        robot_model = self.judgement.request.robot_model
-        judged = {"judgement": self.judgement.summary(self.judgement.word(self.judgement.warnings(None)))}
-        found = gains_summary(self.found, self.given.tolist(), robot_model.robot.joints)
-        return {"robot": robot_model.name, **found, **judged}
-
-    def __repr__(self) -> str:
-        joints = self.judgement.request.robot_model.robot.joints
-        return printed(lambda console: print_gains(console, self.found, self.given.tolist(), joints))
-
-    @property
-    def gains(self) -> Array:
-        """The gains to read logs with: those that the logs show, otherwise the given ones, shape (joint,)."""
-        return np.where(self.found.shown, self.found.gains, self.given)
-
-
-def payload_of(asked: PayloadRequest) -> PayloadFit:
+def payload_of(asked: PayloadRequest) -> LoadFit:
     """The payload in the gripper.
 
     Raises
@@ -110,7 +112,7 @@ def payload_of(asked: PayloadRequest) -> PayloadFit:
         raise ExperimentError(f"--gain-sigma {given}: give a share from 0 to 1, for all {n} joints or for each")
     if asked.before is None:
         notes = (*notes, f"{OF_GAINS}; a payload of known mass shows them: {judgement.gains_command}")
-        return PayloadFit(judgement, _by_ways(judgement, asked), notes if not asked.gain_sigma else notes[:-1])
+        return _payload(judgement, notes if not asked.gain_sigma else notes[:-1], _by_ways(judgement, asked))
     names, X, C = _before(asked.before)
     if missing := [name for name in names if name not in robot.robot.names]:
         raise ExperimentError(
@@ -118,10 +120,19 @@ def payload_of(asked: PayloadRequest) -> PayloadFit:
             f"{', '.join(missing[:3])}; give the options of that identification, such as --add offset or --friction"
         )
     judgement = replace(judgement, before=dict(zip(names, X.tolist(), strict=True)))
-    return PayloadFit(judgement, {"fixed": with_known_robot(robot, names, X, C)}, notes)
+    return _payload(judgement, notes, {"fixed": with_known_robot(robot, names, X, C)})
 
 
-def gains_of(asked: GainsRequest) -> GainsFit:
+def _payload(judgement: LoadJudgement, notes: Sequence[str], found: Mapping[str, PayloadEstimate | str]) -> LoadFit:
+    ways = {way: payload for way, payload in found.items() if isinstance(payload, PayloadEstimate)}
+    leading, robot_model = next(iter(ways.values())), judgement.request.robot_model
+    lines = (*payload_lines(found, leading), *notes)
+    content = {"robot": robot_model.name, **payload_summary(found, ways)}
+    table = payload_table(ways, robot_model.robot.joints[-1])
+    return LoadFit(judgement, found, words_of_payload(leading), table, lines, content, leading)
+
+
+def gains_of(asked: GainsRequest) -> LoadFit:
     """Return the torque constants of the drives.
 
     Raises
@@ -136,8 +147,18 @@ def gains_of(asked: GainsRequest) -> GainsFit:
     found = identify_drive_gains(robot)
     given = np.broadcast_to(robot.loaded[0].torque.gain, (robot.tree.n,)) * judgement.gain
     found = replace(found, gains=found.gains * judgement.gain, sigma=found.sigma * judgement.gain)
-    made = GainsFit(judgement, found, given, notes)
-    return replace(made, judgement=judgement.with_gains(made.gains / given))
+    gains, robot_model = np.where(found.shown, found.gains, given), judgement.request.robot_model
+    joints = robot_model.robot.joints
+    return LoadFit(
+        judgement.with_gains(gains / given),
+        found,
+        f"gains {' '.join(f'{gain:.4g}' for gain in gains)}",
+        gains_table(found, given.tolist(), joints),
+        (f"to read logs with them: --gain {' '.join(f'{gain:.5g}' for gain in gains)}", *notes),
+        {"robot": robot_model.name, **gains_summary(found, given.tolist(), joints)},
+        gains=gains,
+        doubts={"the gains": doubts_of_gains(found, joints)},
+    )
 
 
 def simulated_pairs(asked: LoadRequest) -> Pairs:

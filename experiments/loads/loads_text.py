@@ -1,14 +1,12 @@
-"""Payloads and gains as text and as summaries."""
+"""Payloads and gains as tables, lines and summaries."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from rich.console import Console
-from rich.text import Text
 
+from idbench.experiments.document import Listing
 from idbench.experiments.loads.known_load import negative_mass
-from idbench.experiments.text import new_table, print_titled
 from idbench.identify import IdentificationError
 from idbench.identify.loads.drive_gains import VAGUE, GainEstimate
 from idbench.identify.loads.loaded_robot import LETTERS
@@ -20,32 +18,32 @@ from idbench.identify.tables import concise
 UNITS = (*["kg m^2"] * 6, *["kg m"] * 3, "kg")
 
 
-def print_payloads(console: Console, found: Mapping[str, PayloadEstimate | str], link: str) -> None:
-    """Print the payload as each way has it, and the body that agrees best with the first."""
-    ways = {way: payload for way, payload in found.items() if isinstance(payload, PayloadEstimate)}
-    grid = new_table("", ["unit", *ways])
-    names = next(iter(ways.values())).names
-    for i, name in enumerate(names):
-        unit = UNITS[LETTERS.index(name)] if name in LETTERS else ""
-        grid.add_row(name, unit, *(concise(float(p.X[i]), float(p.sigma[i])) for p in ways.values()))
-    print_titled(console, f"payload, about the origin of the frame of {link}", grid, 2)
-    for way, why in found.items():
-        if isinstance(why, str):
-            console.print(Text(f"{way}: no estimate: {why}"), soft_wrap=True)
-    leading = next(iter(ways.values()))
+def payload_table(ways: Mapping[str, PayloadEstimate], link: str) -> Listing:
+    """Table of the payload as each way has it."""
+    cells = [
+        {name: concise(x, sigma) for name, x, sigma in zip(p.names, p.X.tolist(), p.sigma.tolist(), strict=True)}
+        for p in ways.values()
+    ]
+    rows = [
+        (name, UNITS[LETTERS.index(name)] if name in LETTERS else "", *(values[name] for values in cells))
+        for name in next(iter(ways.values())).names
+    ]
+    return Listing(f"payload, about the origin of the frame of {link}", ("", "unit", *ways), tuple(rows), 2)
+
+
+def payload_lines(found: Mapping[str, PayloadEstimate | str], leading: PayloadEstimate) -> Iterator[str]:
+    """Yield why some ways have no estimate, what was known, and the body that agrees best with the leading way."""
+    yield from (f"{way}: no estimate: {why}" for way, why in found.items() if isinstance(why, str))
     if leading.known:
-        console.print(Text("known: " + ", ".join(f"{name} = {x:.5g}" for name, x in leading.known.items())))
-    body = body_of(leading)
+        yield "known: " + ", ".join(f"{name} = {x:.5g}" for name, x in leading.known.items())
     if negative_mass(leading):
         return
-    if "mass" in body:
-        centre, inertia = (" ".join(f"{x:.4g}" for x in body[key]) for key in ("centre_of_mass", "principal_inertia"))
-        words = (
-            f"the nearest physically consistent body: {body['mass']:.5g} kg at {centre} m, principal inertias {inertia} kg m^2"
-        )
-        console.print(Text(words), soft_wrap=True)
-    else:
-        console.print(Text(body["why"]), soft_wrap=True)
+    body = body_of(leading)
+    if "mass" not in body:
+        yield body["why"]
+        return
+    centre, inertia = (" ".join(f"{x:.4g}" for x in body[key]) for key in ("centre_of_mass", "principal_inertia"))
+    yield f"the nearest physically consistent body: {body['mass']:.5g} kg at {centre} m, principal inertias {inertia} kg m^2"
 
 
 def words_of_payload(payload: PayloadEstimate) -> str:
@@ -76,9 +74,8 @@ def body_of(payload: PayloadEstimate) -> dict[str, Any]:
     }
 
 
-def payload_summary(found: Mapping[str, PayloadEstimate | str]) -> dict[str, Any]:
-    """Summary of a payload."""
-    ways = {way: payload for way, payload in found.items() if isinstance(payload, PayloadEstimate)}
+def payload_summary(found: Mapping[str, PayloadEstimate | str], ways: Mapping[str, PayloadEstimate]) -> dict[str, Any]:
+    """Summary of a payload, as each way has it."""
     leading = next(iter(ways.values()))
     return {
         "parameters": list(leading.names),
@@ -92,20 +89,20 @@ def payload_summary(found: Mapping[str, PayloadEstimate | str]) -> dict[str, Any
     }
 
 
-def print_gains(console: Console, found: GainEstimate, given: Sequence[float], joints: Sequence[str]) -> list[str]:
-    """Print the gain of each joint; return warnings about those of which the payload says nothing."""
-    grid = new_table("", ["read with", "gain", "%sigma", "change %"])
-    for j, joint in enumerate(joints):
-        gain, sigma = found.gains[j], found.sigma[j]
-        cells = [
-            f"{given[j]:.5g}",
-            concise(gain, sigma),
-            f"{100 * sigma / abs(gain):.2g}",
-            f"{100 * (gain / given[j] - 1):+.2f}",
-        ]
-        grid.add_row(joint, *(cells if found.shown[j] else [cells[0], "refused", cells[2], ""]))
-    print_titled(console, "gains of the drives: torque over what was logged", grid, 1)
-    lost = [joint for joint, told in zip(joints, found.shown, strict=True) if not told]
+def gains_table(found: GainEstimate, given: Sequence[float], joints: Sequence[str]) -> Listing:
+    """Table of the gain of each joint."""
+    rows = list[tuple[str, ...]]()
+    for joint, read, gain, sigma, shown in zip(joints, given, found.gains, found.sigma, found.shown, strict=True):
+        change = f"{100 * (gain / read - 1):+.2f}" if shown else ""
+        value = concise(gain, sigma) if shown else "refused"
+        rows.append((joint, f"{read:.5g}", value, f"{100 * sigma / abs(gain):.2g}", change))
+    heads = ("", "read with", "gain", "%sigma", "change %")
+    return Listing("gains of the drives: torque over what was logged", heads, tuple(rows))
+
+
+def doubts_of_gains(found: GainEstimate, joints: Sequence[str]) -> list[str]:
+    """Warnings about gains of which the payload says nothing."""
+    lost = [joint for joint, shown in zip(joints, found.shown, strict=True) if not shown]
     if not lost:
         return []
     return [

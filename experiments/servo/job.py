@@ -8,12 +8,13 @@ from typing import Any
 
 import numpy as np
 
+from idbench.experiments.document import Document
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.robot_model import absolute
 from idbench.experiments.requests.jobs import ServoRequest
 from idbench.experiments.servo.identification import AUTO, Servos, lacks_summary, mistake_summary, summary_of
 from idbench.experiments.servo.joints import Identified
-from idbench.experiments.servo.servo_text import verdict_lines
+from idbench.experiments.servo.servo_text import servo_table, verdict_lines, warnings_of
 from idbench.identify import Array, IdentificationError, SettingError
 from idbench.identify.files.servo_file import ServoFile
 from idbench.identify.files.servo_log import ServoColumns, ordered, read_servo_log
@@ -60,6 +61,31 @@ class ServosFit:
         """What the errors mean: lines, each after its verdict."""
         moved = self.others.moved if self.others else {}
         return verdict_lines(self.fits, self.errors["fitted"], self.errors.get("held out", {}), moved, self.mistakes)
+
+    @property
+    def lines(self) -> list[str]:
+        """Why joints have no fit, and what was read and assumed."""
+        return [
+            *(f"{joint}: no estimate: {why}" for joint, why in self.every.items() if isinstance(why, str)),
+            *self.servos.notes,
+        ]
+
+    @property
+    def warnings(self) -> dict[str, list[str]]:
+        """What to check, by what it is about."""
+        doubts = [*self.servos.doubts, *(self.others.doubts if self.others else [])]
+        return {"the log": doubts, "the servos": warnings_of(self.every, self.mistakes)}
+
+    def document(self) -> Document:
+        """What the fits say: verdicts, parameters, positions of the last log and their errors."""
+        loops = ", ".join(dict.fromkeys(f"driven by {fit.servo.kind}" for fit in self.fits.values()))
+        title, table = f"{self.servos.robot}: {', '.join(self.fits)}", servo_table(self.fits)
+        return Document(title, loops, self.verdicts, self.warnings, [table], self.lines, self._figures)
+
+    def _figures(self) -> list[tuple[str, str]]:
+        from idbench.experiments.reports.servo_figures import servo_figures
+
+        return servo_figures(self)
 
     def parameters(self) -> dict[str, Any]:
         """Summary of the fits."""

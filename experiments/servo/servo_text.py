@@ -3,12 +3,11 @@
 from collections.abc import Collection, Iterable, Iterator, Mapping
 
 import numpy as np
-from rich.text import Text
 
+from idbench.experiments.document import Listing
 from idbench.experiments.judgement.held_out import FAIR, GOOD
-from idbench.experiments.results.page import Page
 from idbench.experiments.servo.identification import unit_of
-from idbench.experiments.text import error_percentage, new_table, number, print_titled
+from idbench.experiments.text import error_percentage, number
 from idbench.identify import Array
 from idbench.identify.arrays import TINY
 from idbench.identify.servo import ServoFit
@@ -45,19 +44,17 @@ MISTAKEN: Mapping[str, str] = {
 """What mistakes are, in words."""
 
 
-def print_servos(page: Page, fits: Mapping[str, ServoFit | str]) -> None:
-    """Print parameters with their standard errors, and why some joints have none."""
-    found = {joint: fit for joint, fit in fits.items() if isinstance(fit, ServoFit)}
-    grid = new_table("", found)
-    for name in SERVO_PARAMETERS:
-        if any(name in fit.p for fit in found.values()):
-            cells = (value_of(fit, name) for fit in found.values())
-            grid.add_row(f"{name} [{unit_of(next(iter(found.values())).servo, name)}]", *cells)
-    laws = dict.fromkeys(LAWS[fit.servo.kind] for fit in found.values())
-    print_titled(page, f"servos: torque = {', or '.join(laws)}, friction and armature at the joint", grid)
-    for joint, fit in fits.items():
-        if isinstance(fit, str):
-            page.print(Text(f"{joint}: no estimate: {fit}"), soft_wrap=True)
+def servo_table(fits: Mapping[str, ServoFit]) -> Listing:
+    """Table of the parameters with their standard errors."""
+    first = next(iter(fits.values()))
+    rows = (
+        (f"{name} [{unit_of(first.servo, name)}]", *(value_of(fit, name) for fit in fits.values()))
+        for name in SERVO_PARAMETERS
+        if any(name in fit.p for fit in fits.values())
+    )
+    laws = dict.fromkeys(LAWS[fit.servo.kind] for fit in fits.values())
+    title = f"servos: torque = {', or '.join(laws)}, friction and armature at the joint"
+    return Listing(title, ("", *fits), tuple(rows))
 
 
 def value_of(fit: ServoFit, name: str) -> str:
@@ -71,13 +68,10 @@ def value_of(fit: ServoFit, name: str) -> str:
     return f"{number(fit.p[name])} held" if sigma is None else concise(fit.p[name], sigma)
 
 
-def print_errors(page: Page, what: str, errors: Mapping[str, Array]) -> None:
-    """Print mean absolute errors of positions that follow from commands alone."""
-    for joint, each in errors.items():
-        mean = float(np.mean(each))
-        page.print(
-            Text(f"{what}, {joint}: mean error of the position {mean:.2g} rad ({np.rad2deg(mean):.2g} deg)"), soft_wrap=True
-        )
+def error_line(what: str, joint: str, errors: Array) -> str:
+    """Mean absolute error of positions that follow from commands alone, in words."""
+    mean = float(np.mean(errors))
+    return f"{what}, {joint}: mean error of the position {mean:.2g} rad ({np.rad2deg(mean):.2g} deg)"
 
 
 def warnings_of(fits: Mapping[str, ServoFit | str], mistakes: Collection[str] = ()) -> list[str]:
@@ -202,11 +196,16 @@ def _lacks(fit: ServoFit) -> str:
     return f"mean residuals: {', '.join(f'{size} while {lack.when}' for size, lack in zip(sizes, lacks, strict=True))}"
 
 
-def print_choice(page: Page, joint: str, choice: ServoFrictionChoice) -> None:
-    """Print laws of friction compared by parts of the log that their fits did not see."""
+def choice_table(joint: str, choice: ServoFrictionChoice) -> Listing:
+    """Table of laws of friction compared by parts of the log that their fits did not see."""
     first = next(iter(choice.errors))
-    grid = new_table("law", ["mrad", f"p, against {first}"])
-    for law, error in choice.errors.items():
-        p = f"{choice.p[law]:.2g}" if law in choice.p else ""
-        grid.add_row(f"{law}{' (chosen)' if law == choice.chosen else ''}", number(1e3 * error), p)
-    print_titled(page, f"{joint}: laws of friction, by the error of parts of the log that their fits did not see", grid)
+    rows = (
+        (
+            f"{law}{' (chosen)' if law == choice.chosen else ''}",
+            number(1e3 * error),
+            f"{choice.p[law]:.2g}" if law in choice.p else "",
+        )
+        for law, error in choice.errors.items()
+    )
+    title = f"{joint}: laws of friction, by the error of parts of the log that their fits did not see"
+    return Listing(title, ("law", "mrad", f"p, against {first}"), tuple(rows))

@@ -168,8 +168,8 @@ def test_the_payload_command(files, capsys):
     assert summary["body"]["mass"] == pytest.approx(2.0, rel=0.01)
     assert len(summary["ways"]["together"]["covariance"]) == 10
     report = (files / "found" / "report.html").read_text()
-    assert "verdict: " in report
-    assert "Payload, about the origin of the frame of joint6" in report
+    assert "Result: " in report
+    assert "payload, about the origin of the frame of joint6" in report
 
 
 @pytest.mark.thorough
@@ -235,7 +235,7 @@ def test_a_torque_with_the_other_sign_is_named_in_both_logs(files):
 
 @pytest.mark.thorough
 def test_the_command_that_shows_the_gains_is_said_in_full(files):
-    note = payload_of(asked_of(files)).notes[-1]
+    note = payload_of(asked_of(files)).lines[-1]
     command = note.partition("a payload of known mass shows them: ")[2]
     assert command.startswith("uv run idbench gains ")
     assert command.endswith("--robot puma560 --mass KG --at X Y Z")

@@ -29,7 +29,7 @@ from idbench.experiments.servo.servo_files import (
     servo_function,
     without_servo,
 )
-from idbench.experiments.servo.servo_text import print_choice, print_errors, print_servos, warnings_of
+from idbench.experiments.servo.servo_text import choice_table, error_line, servo_table
 from idbench.identify.servo import ServoFit
 from idbench.identify.servo.choice import ServoFrictionChoice
 
@@ -56,7 +56,8 @@ def servo(options: IdentifyServo) -> None:
         others = made.others
         found = made.fits
         for what, each in made.errors.items():
-            print_errors(page, "fitted logs" if what == "fitted" else "held out logs", each)
+            for joint, errors in each.items():
+                page.print(Text(error_line(f"{what} logs", joint, errors)), soft_wrap=True)
         page.found |= made.summary()
         for _, line in made.verdicts:
             page.print(Text(line), soft_wrap=True)
@@ -84,7 +85,7 @@ def _identified(page: Page, folder: ResultsFolder | None, options: IdentifyServo
 
     def heard(joint: str, result: Identified | str, made: ServosFit) -> None:
         if isinstance(result, ServoFrictionChoice):
-            print_choice(page, joint, result)
+            choice_table(joint, result).show(page)
         last[:] = [made]
         page.found |= made.parameters()
         if page.found["joints"]:
@@ -95,11 +96,10 @@ def _identified(page: Page, folder: ResultsFolder | None, options: IdentifyServo
             made = servos_identified(options, heard)
     finally:
         if last and last[0].fits:
-            print_servos(page, last[0].every)
-    for note in made.servos.notes:
-        page.print(Text(note), soft_wrap=True)
-    doubts = [*made.servos.doubts, *(made.others.doubts if made.others else [])]
-    page.warn({"the log": doubts, "the servos": warnings_of(made.every, made.mistakes)})
+            servo_table(last[0].fits).show(page)
+    for line in made.lines:
+        page.print(Text(line), soft_wrap=True)
+    page.warn(made.warnings)
     return made
 
 
@@ -121,7 +121,8 @@ def _write(page: Page, options: IdentifyServo, servos: Servos, others: Servos | 
         errors = in_mujoco(judged, found, place, log, options.position)
         name = judged.name(log)
         page.found.setdefault("mujoco_error", {})[name] = errors
-        print_errors(page, f"{path.name} in plain MuJoCo, {name}", {joint: np.array([e]) for joint, e in errors.items()})
+        for joint, e in errors.items():
+            page.print(Text(error_line(f"{path.name} in plain MuJoCo, {name}", joint, np.array([e]))), soft_wrap=True)
 
 
 def _write_function(page: Page, options: IdentifyServo, servos: Servos, found: dict[str, ServoFit]) -> None:
@@ -134,9 +135,9 @@ def _write_function(page: Page, options: IdentifyServo, servos: Servos, found: d
 
 
 def _report(made: ServosFit, command: str) -> str:
-    from idbench.experiments.reports.others import report_of_servos
+    from idbench.experiments.reports.plain import page_of
 
-    return report_of_servos(made, made.servos.notes, command)
+    return page_of(made.document(), command)
 
 
 def _recorded(servos: Servos, found: dict[str, ServoFit], audience: Audience | None) -> "Streams":
