@@ -14,7 +14,7 @@ from idbench.sim.robot.robot import Robot
 def files_of(asked: Any) -> tuple[Path, ...]:
     """The files that are read, by the marks of the request: nothing may be written over them."""
     found = dict[Path, None]()
-    for place, hint in request_keys(next(kind for kind in type(asked).__mro__ if kind.__module__ == jobs.__name__)).values():
+    for place, hint in request_keys(jobs.request_type(asked)).values():
         what = next((mark.file for mark in getattr(hint, "__metadata__", ()) if isinstance(mark, Word)), "")
         value = asked
         for name in place:

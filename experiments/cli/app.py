@@ -87,6 +87,7 @@ def command(name: str) -> Callable[[type], type]:
 
     def register(options: type) -> type:
         COMMANDS[name] = options
+        options.called = name  # type: ignore[attr-defined]  # of a Command
         return options
 
     return register

@@ -10,6 +10,7 @@ from typing import Any, ClassVar, TypeVar, get_type_hints
 from idbench.experiments.cli.interruption import importing
 from idbench.experiments.cli.parser import word_of
 from idbench.experiments.program import program
+from idbench.experiments.requests.jobs import request_type
 
 
 class Command:
@@ -17,6 +18,8 @@ class Command:
 
     action: ClassVar[str] = ""
     """File of `idbench.experiments.cli.commands` and function, as in logs:show_log; it receives the options."""
+    called: ClassVar[str] = ""
+    """Name of the command."""
 
     def __init_subclass__(cls, action: str = "") -> None:
         cls.action = action or cls.action
@@ -29,42 +32,37 @@ class Command:
         function(self)
 
 
-def command_of(name: str, options: Any, positional: str, left_out: tuple[str, ...], *, absolute: bool = False) -> str:
-    """Command line of a request: all that differs from the defaults, but for fields that are left out.
+def command_of(options: Any, *, out: bool = False, absolute: bool = False) -> str:
+    """Command line of a request: all that differs from the defaults, but for what only shows or writes its results.
 
     Parameters
     ----------
-    name : str
-        The command's name.
     options : dataclass
-        Its options.
-    positional : str
-        The field that is typed without its name; empty if there is none.
-    left_out : tuple of str
-        Fields that are left out.
+        Options of a command that does a job.
+    out : bool
+        Whether the folder of the results is named, too.
     absolute : bool
         Whether files are named from the root: then the same command reads the same files.
     """
-    given = getattr(options, positional) if positional else ()
-    values = given if isinstance(given, tuple) else () if given is None else (given,)
-    words = [_word(x, absolute) for x in values]
-    return " ".join([program(), name, *words, *_options(options, (positional, *left_out), absolute)])
+    folder = ["--out", quote(str(options.out))] if out and options.out else []
+    return " ".join([program(), options.called, *_words(options, request_type(options), absolute), *folder])
 
 
-def _options(part: Any, left_out: tuple[str, ...], absolute: bool) -> Iterator[str]:
-    hints = get_type_hints(type(part), include_extras=True)
-    for field in fields(part):
-        value = getattr(part, field.name)
-        if field.name in left_out or (field.default is not MISSING and value == field.default):
+def _words(part: Any, kind: type, absolute: bool) -> Iterator[str]:
+    """Yield the words of a request, or of a group of it: what is typed without a name first."""
+    words = {name: word_of(hint) for name, hint in get_type_hints(kind, include_extras=True).items()}
+    for field in sorted(fields(kind), key=lambda field: not words[field.name].positional):
+        value, word = getattr(part, field.name), words[field.name]
+        option = f"--{word.option or field.name.replace('_', '-')}"
+        if field.default is not MISSING and value == field.default:
             continue
-        option = f"--{word_of(hints[field.name]).option or field.name.replace('_', '-')}"
         if is_dataclass(value):
-            yield from _options(value, left_out, absolute)
+            yield from _words(value, type(value), absolute)
         elif isinstance(value, bool):
             yield option if value else f"--no-{option[2:]}"
         else:
             several = value if isinstance(value, tuple) else (value,)
-            yield " ".join([option, *(_word(x, absolute) for x in several)])
+            yield from (*([] if word.positional else [option]), *(_word(x, absolute) for x in several))
 
 
 def _word(value: object, absolute: bool) -> str:

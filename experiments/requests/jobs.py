@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from idbench.experiments.requests.shared import CHAIN, ESTIMATOR, LogRequest, MountingOptions, Parameters
 from idbench.experiments.requests.words import (
@@ -254,3 +254,8 @@ class Table2Request:
 
     scenario: str = "table2"
     """Name of a scenario, or a file (TOML)."""
+
+
+def request_type(asked: Any) -> type:
+    """Class of a request, of which the options of a command may be a subclass."""
+    return next(kind for kind in type(asked).__mro__ if kind.__module__ == __name__)

@@ -185,7 +185,7 @@ def test_the_payload_of_a_robot_identified_before(files):
 def test_the_gains_command(files, capsys):
     words = ["gains", "full.parquet", "--unloaded", "empty.parquet", "--robot", "puma560", "--estimator", "WLS"]
     assert main([*words, "--mass", "2.0", "--out", "found"]) == 0
-    assert "Gains of the drives" in (files / "found" / "report.html").read_text()
+    assert "gains of the drives" in (files / "found" / "report.html").read_text()
     assert "to read logs with them: --gain " in capsys.readouterr().out
     summary = json.loads((files / "found" / "summary.json").read_text())
     np.testing.assert_allclose(summary["gains"], 1.0, rtol=0.02)

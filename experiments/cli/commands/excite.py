@@ -25,15 +25,12 @@ from idbench.sim.limits.motion_limits import looser
 if TYPE_CHECKING:
     from idbench.experiments.results.attempts import Streams
 
-LEFT_OUT = ("out", "force", "json", "watching")
-"""Options that make no difference to a motion, or stand elsewhere in the command."""
-
 
 def excite(options: Excite) -> None:
     """Design a motion, or a sequence of them, save and show it."""
     stem, design = Path(options.robot).stem, designed(with_own_parts(options))
-    command = command_of("excite", options, "robot", ("force", "json", "watching"))
-    whole = command_of("excite", options, "robot", LEFT_OUT, absolute=True)
+    command = command_of(options, out=True)
+    whole = command_of(options, absolute=True)
     out = options.out or Path("runs") / f"excited-{stem}"
     folder, page = ResultsFolder(out, "excite", whole, options.force, files_of(options)), new_page(machine=options.json)
     with options.watching.audience() as audience, shown(page), folder.held():

@@ -43,18 +43,12 @@ from idbench.identify.files.log_file import write_log
 
 ASSUMED = f"no --robot was given, the shipped {SCARA} is assumed"
 
-LEFT_OUT = ("out", "force", "json", "watching", "write", "write_mjcf", "follow", "verbose")
-"""Options that make no difference to an identification."""
-
-NOT_MADE_AGAIN = tuple(name for name in LEFT_OUT if name != "out")
-"""Options that a report does not name where it says how to make it again."""
-
 
 def identify(options: Identify) -> None:
     """Identify logs, judge the result, save and show it."""
     page, request = new_page(machine=options.json), request_of(with_own_parts(options))
-    command, read = command_of("identify", options, "log", NOT_MADE_AGAIN), files_of(options)
-    whole, log = command_of("identify", options, "log", LEFT_OUT, absolute=True), file_of(options.log[0]).absolute()
+    command, read = command_of(options, out=True), files_of(options)
+    whole, log = command_of(options, absolute=True), file_of(options.log[0]).absolute()
     folder = ResultsFolder(options.out, "identify", whole, options.force, read) if options.out else None
     require_targets(options, request.robot_model, folder, read)
     require_layer(options, request.label, command)

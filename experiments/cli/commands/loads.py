@@ -25,8 +25,6 @@ from idbench.experiments.results.writing import require_free, write_text
 from idbench.experiments.text import new_table, print_titled
 from idbench.sim.robot.rewrite import with_body
 
-NOT_MADE_AGAIN = ("force", "json", "write_mjcf")  # Options that a report does not name where it says how to make it again
-
 
 def payload(options: IdentifyPayload) -> None:
     """Identify what the gripper holds."""
@@ -34,7 +32,7 @@ def payload(options: IdentifyPayload) -> None:
         if path.suffix != ".xml":
             raise ExperimentError(f"--write-mjcf {path}: its name must end with .xml")
         require_free(path, "--write-mjcf", force=options.force, read=files_of(options))
-    with _page(options, "payload") as (page, folder):
+    with _page(options) as (page, folder):
         if options.simulate is not None:
             _compare_ways(page, options)
             save_summary(page, folder)
@@ -47,7 +45,7 @@ def payload(options: IdentifyPayload) -> None:
 
 def gains(options: IdentifyGains) -> None:
     """Identify the gains of drives."""
-    with _page(options, "gains") as (page, folder):
+    with _page(options) as (page, folder):
         if options.simulate is not None:
             _try_gains(page, options)
             save_summary(page, folder)
@@ -57,13 +55,14 @@ def gains(options: IdentifyGains) -> None:
 
 
 @contextmanager
-def _page(options: IdentifyPayload | IdentifyGains, experiment: str) -> Iterator[tuple[Page, ResultsFolder | None]]:
+def _page(options: IdentifyPayload | IdentifyGains) -> Iterator[tuple[Page, ResultsFolder | None]]:
     """Give the page of a command and the folder of its results, and say in the end where they are."""
     page, folder = new_page(machine=options.json), None
-    page.found |= {"experiment": experiment}
+    page.found |= {"experiment": options.called}
     if options.out is not None:
-        command = command_of(experiment, options, "log", ("out", *NOT_MADE_AGAIN), absolute=True)
-        folder = ResultsFolder(options.out, experiment, command, options.force, files_of(options))
+        folder = ResultsFolder(
+            options.out, options.called, command_of(options, absolute=True), options.force, files_of(options)
+        )
         folder.check()
     with shown(page), folder.held() if folder else nullcontext():
         yield page, folder
@@ -97,8 +96,7 @@ def _identified(
             page.warn(document.warnings)
             page.show()
             attempts.attempt("summary.json", lambda: save_summary(page, folder))
-            command = command_of(str(page.found["experiment"]), options, "log", NOT_MADE_AGAIN)
-            attempts.file("report.html", lambda: _report(document, command))
+            attempts.file("report.html", lambda: _report(document, command_of(options, out=True)))
         yield attempts
 
 

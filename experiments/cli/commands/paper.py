@@ -23,15 +23,11 @@ from idbench.experiments.results.writing import require_free, write_text
 from idbench.identify.files.log_file import write_log
 from idbench.sim.scenario.scenario_file import load, to_toml
 
-LEFT_OUT = ("out", "force", "json", "watching")  # Options that make no difference to a table
-
 
 def _folder(options: Table1Command | Table2Command, experiment: str) -> ResultsFolder:
     """Return the folder of a table's results."""
     out = options.out or Path("runs") / experiment
-    folder = ResultsFolder(
-        out, experiment, command_of(experiment.partition("-")[0], options, "", LEFT_OUT, absolute=True), options.force
-    )
+    folder = ResultsFolder(out, experiment, command_of(options, absolute=True), options.force)
     folder.check()
     return folder
 

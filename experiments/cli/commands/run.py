@@ -27,8 +27,6 @@ from idbench.identify.files.log_file import write_log
 from idbench.sim.drives import ServoDrive
 from idbench.sim.scenario.scenario import Scenario
 
-LEFT_OUT = ("out", "force", "json", "watching", "yes", "verbose")  # Options that make no difference to a run's results
-
 
 def run(options: RunCommand) -> None:
     """Simulate a scenario, identify it, save and record it."""
@@ -36,7 +34,7 @@ def run(options: RunCommand) -> None:
     made = run_of(with_own_parts(options), lambda said: page.print(Text(said), soft_wrap=True))
     require_window(options.inner, watching)
     name = made.scenario.name
-    command = command_of("run", options, "scenario", LEFT_OUT, absolute=True)
+    command = command_of(options, absolute=True)
     folder = ResultsFolder(options.out or Path("runs") / name, "run", command, options.force, files_of(options))
     folder.check()
     made.require_bearable(options.yes)

@@ -37,10 +37,6 @@ if TYPE_CHECKING:
     from idbench.experiments.results.attempts import Streams
 
 
-NOT_MADE_AGAIN = ("force", "json", "write_mjcf", "write", "watching")
-"""Options that a report does not name where it says how to make it again."""
-
-
 def servo(options: IdentifyServo) -> None:
     """Identify servos."""
     page, folder = new_page(machine=options.json), _folder(options)
@@ -67,8 +63,7 @@ def servo(options: IdentifyServo) -> None:
             if options.write_mjcf is not None:
                 attempts.attempt("--write-mjcf", lambda: _write(page, options, servos, others, found))
                 attempts.attempt("summary.json", lambda: save_summary(page, folder))
-            command = command_of("servo", options, "log", NOT_MADE_AGAIN)
-            attempts.file("report.html", lambda: _report(made, command))
+            attempts.file("report.html", lambda: _report(made, command_of(options, out=True)))
             if options.write is not None:
                 attempts.attempt("--write", lambda: _write_function(page, options, servos, found))
             if options.watching.rerun and (folder is not None or audience is not None):
@@ -150,7 +145,7 @@ def _recorded(servos: Servos, found: dict[str, ServoFit], audience: Audience | N
 def _folder(options: IdentifyServo) -> ResultsFolder | None:
     if options.out is None:
         return None
-    command = command_of("servo", options, "log", ("out", *NOT_MADE_AGAIN), absolute=True)
+    command = command_of(options, absolute=True)
     folder = ResultsFolder(options.out, "servo", command, options.force, files_of(options))
     folder.check()
     return folder
