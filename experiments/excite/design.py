@@ -9,7 +9,7 @@ import numpy as np
 
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.excite.excitation import EXCITATIONS, AbstractExcitation
-from idbench.experiments.excite.limit_use import FS, Inspector, LimitUse
+from idbench.experiments.excite.limit_use import FS, LimitUse
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.requests.shared import Parameters
 from idbench.identify import CHAINS, Array, FirLowPass, MotionLog, NoiseLevels
@@ -18,10 +18,11 @@ from idbench.identify.design.criteria import CRITERIA, AbstractCriterion, LogSig
 from idbench.identify.design.information import Information, predicted_information
 from idbench.identify.design.plan import Plan
 from idbench.identify.noise.linearization import slopes
-from idbench.identify.parameters.base_parameters import random_states
+from idbench.identify.parameters.base_parameters import columns_at, random_states
 from idbench.identify.plugins import did_you_mean
 from idbench.sim.limits.clearance import Clearance
 from idbench.sim.limits.motion_limits import BOX, CLEARANCE, FLOOR, MotionLimits, home_position, limits_of, surroundings
+from idbench.sim.robot.inverse_dynamics import coulomb_torque, inverse_dynamics
 from idbench.sim.scenario.scenario import Scenario
 from idbench.sim.trajectories.time_optimal import approach
 from idbench.sim.trajectories.trajectory import AbstractTrajectory, Reference
@@ -40,6 +41,7 @@ STATES, LEAST = 12.0, 8.0  # States for each period of the highest frequency, an
 MANY = 400  # Most periods of the highest frequency: slopes of more take hours
 FINER = 4  # Instants at which limits are kept, for each state
 POSTURES = 200  # Random postures over which inertia is averaged
+BLOCK = 2000  # States whose columns are made together
 PASS = FirLowPass().cutoff  # End of the pass band of the rows [Hz]
 
 
@@ -147,7 +149,7 @@ class Design:
     def require_home(self) -> None:
         """Raise ExperimentError if limits are broken where the arm comes from, at rest."""
         q = np.repeat(self.home[None], 2, axis=0)
-        if broken := next(self.inspector.look(Reference(FS, q, 0 * q, 0 * q)).broken(), None):
+        if broken := next(self.use_of(Reference(FS, q, 0 * q, 0 * q)).broken(), None):
             what = broken.partition(" at ")[0]
             raise ExperimentError(
                 f"at home, at rest, {what}: give another home, or a larger torque_share, in a file of --limits"
@@ -176,8 +178,48 @@ class Design:
 
     @cached_property
     def plan(self) -> Plan:
-        """What the search minimises."""
-        return plan_for(self)
+        """What the search minimises; raise ExperimentError if the motion is too short for the parameters."""
+        self._require_enough()
+        moves = max(1, round(self.duration * self.frequency))
+        if moves > MANY:
+            raise ExperimentError(f"{moves} periods of {self.frequency:g} Hz are more than {MANY}: give a shorter --duration")
+        count = moves * ceil(max(LEAST, STATES * self.frequency) * self.duration / moves)  # where moves begin, jerk peaks
+        rate = count / self.duration
+        grids = (np.arange(count) + 0.5) / rate, np.arange(FINER * count) / (FINER * rate)
+        states, instants = (self.excitation.shapes(np.asarray(t), self.duration, self.frequency) for t in grids)
+        noise = self.first_criterion.noise
+        return Plan(
+            information=self._information(rate, noise),
+            criterion=self.first_criterion,
+            limits=self.limits,
+            states=states,
+            instants=instants,
+            X=self.X,
+            known=self.known if noise else np.zeros_like(self.known),
+            prior_error=self.asked.prior_error,
+            torque_share=self.asked.torque_share,
+            repeat=self.repeat,
+            home=self.home,
+            obstacles=self.clearance.cost if self.clearance.checks else None,
+        )
+
+    def _require_enough(self) -> None:
+        p, rows = len(self.X), 2 * PASS * self.duration * self.robot_model.robot.n
+        if rows < p:
+            raise ExperimentError(
+                f"{self.duration:g} s make {rows:.0f} rows behind a filter at {PASS:g} Hz, fewer than the {p} parameters: "
+                f"give a --duration of at least {ceil(max(4 * p / rows * self.duration, 3 / self.frequency))} s"
+            )
+
+    def _information(self, rate: float, noise: bool) -> Information:
+        """Return the information of motions, with their noise, or as if all rows were alike."""
+        basis = self.robot_model.basis
+        fs = self.scenario.fs
+        n = self.robot_model.robot.n
+        levels = self.levels if noise else NoiseLevels(np.ones(n), np.zeros(n))
+        q, qd, qdd = random_states(self.robot_model.tree, POSTURES)
+        inertia = np.asarray(slopes(basis, self.X, q, qd, qdd, qd).inertia.mean(axis=-1))  # M(q), on average over postures
+        return Information(basis, levels, inertia, fs, rate, min(PASS, fs / 2))
 
     @property
     def first_criterion(self) -> AbstractCriterion:
@@ -191,11 +233,6 @@ class Design:
         """The mean of ln sigma, weighted as asked."""
         weights = np.array([self.weights.get(name, 1.0) for name in self.robot_model.basis.names])
         return LogSigma(tuple(weights / weights.sum()))
-
-    @cached_property
-    def inspector(self) -> Inspector:
-        """What looks at motions."""
-        return Inspector(self.robot_model.robot, self.limits, self.asked, self.clearance, self.robot_model.basis, self.X)
 
     def trajectory(self, c: Array, repeat: int | None = None) -> AbstractTrajectory:
         """Return the trajectory of coefficients."""
@@ -214,12 +251,12 @@ class Design:
             found.append(predicted_information(log, self.robot_model.basis, self.X, levels, CHAINS.create("idbench")))
         return self.known + self.repeat * np.concatenate(found)
 
-    def random_motions(self, count: int = RANDOM) -> tuple[list[Array], int]:
+    def random_motions(self) -> tuple[list[Array], int]:
         """Return coefficients of random motions that keep the limits, and how many were drawn."""
         rng = np.random.default_rng([self.seed, 1])
         kept = list[Array]()
         drawn = 0
-        while len(kept) < count and drawn < DRAWS:
+        while len(kept) < RANDOM and drawn < DRAWS:
             c, drawn = self.excitation.random(rng, self.plan, self.duration, self.frequency), drawn + 1
             if self.plan.excess(c) == 0:
                 kept.append(c)
@@ -235,61 +272,35 @@ class Design:
     def pace(self, c: Array) -> float:
         """Speed scale of the ways to and from home: slower where their torques would be too large."""
         for pace in PACES:
-            if not any(broken for way in self.ways(c, FS, pace) for broken in self.inspector.look(way).broken()):
+            if not any(broken for way in self.ways(c, FS, pace) for broken in self.use_of(way).broken()):
                 break
         return pace
 
     def look(self, c: Array) -> LimitUse:
         """Use of the limits by a motion."""
-        return self.inspector.look(self.trajectory(c, 1).motion(self.robot_model.robot).sample(FS))
+        return self.use_of(self.trajectory(c, 1).motion(self.robot_model.robot).sample(FS))
 
+    def use_of(self, motion: Reference) -> LimitUse:
+        """Use of the limits by a motion that is sampled at FS."""
+        robot = self.robot_model.robot
+        limits = self.limits
+        jerk = np.gradient(motion.qdd, 1 / FS, axis=0)
+        rates = {"velocity": motion.qd, "acceleration": motion.qdd, "jerk": jerk}
+        shares = {"position": np.abs(motion.q - limits.middle) / limits.sizes[0]}
+        shares |= {name: np.abs(x) / getattr(limits, name) for name, x in rates.items()}
+        tau = inverse_dynamics(robot, motion.q, motion.qd, motion.qdd) + coulomb_torque(robot, motion.qd)
+        shares["torque"] = np.abs(tau) / (self.asked.torque_share * limits.torque)
+        shares["worst-case torque"] = (np.abs(tau) + self.asked.prior_error * self._spread(motion)) / limits.torque
+        moves = motion.qd.any(axis=1)  # of a motion that is repeated, rest is at the ends alone
+        squares = np.mean(tau[moves] ** 2, axis=0, keepdims=True) if moves.any() else 0 * tau[:1]
+        shares["rms torque"] = np.sqrt(squares) / limits.rms_torque
+        limited = {name: share for name, share in shares.items() if share.any()}
+        touch = self.clearance.nearest(motion.q, motion.qd, FS)
+        return LimitUse(limited, touch, self.asked.clearance, robot.joints)
 
-def plan_for(design: Design) -> Plan:
-    """Plan that the search minimises; raise ExperimentError if the motion is too short for the parameters."""
-    _require_enough(design)
-    moves = max(1, round(design.duration * design.frequency))
-    if moves > MANY:
-        raise ExperimentError(f"{moves} periods of {design.frequency:g} Hz are more than {MANY}: give a shorter --duration")
-    count = moves * ceil(max(LEAST, STATES * design.frequency) * design.duration / moves)  # where moves begin, jerk peaks
-    rate = count / design.duration
-    grids = (np.arange(count) + 0.5) / rate, np.arange(FINER * count) / (FINER * rate)
-    states, instants = (design.excitation.shapes(np.asarray(t), design.duration, design.frequency) for t in grids)
-    noise = design.first_criterion.noise
-    return Plan(
-        information=_information(design, rate, noise),
-        criterion=design.first_criterion,
-        limits=design.limits,
-        states=states,
-        instants=instants,
-        X=design.X,
-        known=design.known if noise else np.zeros_like(design.known),
-        prior_error=design.asked.prior_error,
-        torque_share=design.asked.torque_share,
-        repeat=design.repeat,
-        home=design.home,
-        obstacles=design.clearance.cost if design.clearance.checks else None,
-    )
-
-
-def _information(design: Design, rate: float, noise: bool) -> Information:
-    """Return the information of motions, with their noise, or as if all rows were alike."""
-    basis = design.robot_model.basis
-    fs = design.scenario.fs
-    n = design.robot_model.robot.n
-    levels = design.levels if noise else NoiseLevels(np.ones(n), np.zeros(n))
-    return Information(basis, levels, _inertia(design), fs, rate, min(PASS, fs / 2))
-
-
-def _inertia(design: Design) -> Array:
-    """Return M(q), on average over postures."""
-    q, qd, qdd = random_states(design.robot_model.tree, POSTURES)
-    return np.asarray(slopes(design.robot_model.basis, design.X, q, qd, qdd, qd).inertia.mean(axis=-1))
-
-
-def _require_enough(design: Design) -> None:
-    p, rows = len(design.X), 2 * PASS * design.duration * design.robot_model.robot.n
-    if rows < p:
-        raise ExperimentError(
-            f"{design.duration:g} s make {rows:.0f} rows behind a filter at {PASS:g} Hz, fewer than the {p} parameters: "
-            f"give a --duration of at least {ceil(max(4 * p / rows * design.duration, 3 / design.frequency))} s"
-        )
+    def _spread(self, motion: Reference) -> Array:
+        """Return the torques that all parameters make together if none were opposed, shape (time, joint) [N m]."""
+        blocks = [slice(i, i + BLOCK) for i in range(0, len(motion.q), BLOCK)]
+        states = np.stack([motion.q, motion.qd, motion.qdd]).swapaxes(-1, -2)
+        columns = (columns_at(self.robot_model.basis, states[..., b]) for b in blocks)
+        return np.concatenate([np.einsum("jpt,p->tj", np.abs(x), np.abs(self.X)) for x in columns])

@@ -150,7 +150,7 @@ class Excited:
     @cached_property
     def way_uses(self) -> tuple[LimitUse, LimitUse]:
         """How far the ways use the limits."""
-        there, back = (self.design.inspector.look(way) for way in self.ways)
+        there, back = (self.design.use_of(way) for way in self.ways)
         return there, back
 
     @cached_property
