@@ -14,6 +14,7 @@ from idbench.experiments.excite.design import SIGMA, Design
 from idbench.experiments.excite.excitation import REST
 from idbench.experiments.excite.limit_use import FS, LimitUse
 from idbench.experiments.identification.robot_model import absolute
+from idbench.experiments.results.writing import finite
 from idbench.identify import Array
 from idbench.identify.data.kinematics import Limits
 from idbench.identify.design.criteria import sigmas_of
@@ -268,12 +269,12 @@ class Excited:
             "interrupted": self.interrupted,
             "parameters": list(names),
             "prior": d.X.tolist(),
-            **{key: [float(x) if np.isfinite(x) else None for x in values] for key, values in table.items()},
-            "over_random_median": _finite(median),
-            "over_random_best": _finite(best),
+            **{key: [finite(x) for x in values] for key, values in table.items()},
+            "over_random_median": finite(median),
+            "over_random_best": finite(best),
             "random_motions": len(self.random),
             "random_drawn": self.drawn,
-            "condition_number": _finite(self.condition),
+            "condition_number": finite(self.condition),
             "floor": self.floor,
             "noise": {"torque": d.levels.torque.tolist(), "position": d.levels.position.tolist()},
             "limits_used": {name: share.tolist() for name, share in self.use.largest.items()},
@@ -304,7 +305,3 @@ class Excited:
             clearance.bare
         )
         return "; ".join(found)
-
-
-def _finite(x: float) -> float | None:
-    return x if np.isfinite(x) else None
