@@ -18,7 +18,7 @@ from idbench.experiments.results.writing import finite
 from idbench.identify import Array
 from idbench.identify.data.kinematics import Limits
 from idbench.identify.design.criteria import sigmas_of
-from idbench.identify.design.plan import POWER, Plan
+from idbench.identify.design.plan import POWER
 from idbench.identify.design.search import DesignSearch
 from idbench.sim.engine.simulation import Progress
 from idbench.sim.limits.motion_limits import floor_of
@@ -64,7 +64,8 @@ def searched(design: Design, random: Sequence[Array], progress: Callable[[float]
     search, plan = DesignSearch([*own, *cheapest], total, progress), design.plan
     for stage in STAGES:
         search.run(replace(plan, power=stage.power, hard=stage.hard), stage.keep or starts, stage.steps)
-        plan = _last(design)
+        if design.criterion == SIGMA:  # the first stage asked for the determinant
+            plan = replace(design.plan, criterion=design.sigma_criterion)
     for harder in HARDER:
         if not any((use := design.look(search.best)).broken()):
             return search
@@ -82,11 +83,6 @@ def _closer(limits: Limits, use: LimitUse) -> Limits:
     torque = max(over.get("torque", 1.0), over.get("worst-case torque", 1.0))
     rates = {name: getattr(limits, name) / over.get(name, 1.0) for name in ("velocity", "acceleration", "jerk")}
     return replace(limits, **rates, torque=limits.torque / torque, rms_torque=limits.rms_torque / over.get("rms torque", 1.0))
-
-
-def _last(design: Design) -> Plan:
-    """Return the plan that asks for what is minimised in the end."""
-    return replace(design.plan, criterion=design.sigma_criterion) if design.criterion == SIGMA else design.plan
 
 
 BINDING = 0.9  # Share of a limit from which on it counts as active
