@@ -32,10 +32,10 @@ class ServoLack(NamedTuple):
 def residuals_by_state(fit: ServoFit) -> list[ServoLack]:
     """Return residuals by what the joint is doing, the largest first."""
     loop = fit.loop
-    speed = np.stack([_spread(np.abs(np.gradient(run.clean, run.t)), loop.samples) for run in loop.runs])
-    on = np.stack([_spread(run.enabled.astype(float), loop.samples) > 0.5 for run in loop.runs])
-    duty = np.stack(
-        [_spread(run.servo.slope * np.abs(run.command - run.clean) / run.servo.limit, loop.samples) for run in loop.runs]
+    speed = loop.stacked([np.abs(np.gradient(run.clean, run.t)) for run in loop.runs])
+    on = loop.stacked([run.enabled.astype(float) for run in loop.runs]) > 0.5
+    duty = loop.stacked(
+        [run.servo.slope * np.abs(run.command - run.clean) / run.servo.limit for run in loop.runs]
     )  # of the command, not of its target: what matters is whether the joint is near it
     moving, full = speed > SLOW * fit.excitation.speed, duty > 1
     r = np.abs(fit.found.residual)
@@ -49,10 +49,6 @@ def residuals_by_state(fit: ServoFit) -> list[ServoLack]:
     total = loop.kept.sum()
     lacks = [ServoLack(when, float(some.sum() / total), float(r[some].mean())) for when, some in found if some.any()]
     return sorted((x for x in lacks if x.share >= MIN_SHARE), key=lambda x: -x.error)
-
-
-def _spread(x: Array, length: int) -> Array:
-    return np.concatenate([x, np.full(length - len(x), x[-1])])
 
 
 LEVEL = 0.05  # p value, of all comparisons together, below which a law is better

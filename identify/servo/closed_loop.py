@@ -3,7 +3,7 @@
 import os
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -54,14 +54,18 @@ class ServoLoop:
         typical = float(np.median([run.T for run in self.runs]))
         self.h = typical / np.ceil(typical / step - 1e-9)
         self.samples = max(len(run.t) for run in self.runs)
-        self.q = np.stack([_padded(run.clean, self.samples) for run in self.runs])
-        self.kept = np.stack([_padded(run.read_well, self.samples, False) for run in self.runs])
+        self.q = self.stacked([run.clean for run in self.runs])
+        self.kept = np.stack([np.pad(run.read_well, (0, self.samples - len(run.t))) for run in self.runs])
         self.step = max(run.step for run in self.runs)
         self._begin = [initial_state(run) for run in self.runs]
         commands = np.concatenate([run.command for run in self.runs])
         self._fastest = WAY * (float(np.ptp(self.q[self.kept])) + float(np.ptp(commands)) + 1e-6) / self.h
         self._tracks = [self._track(run) for run in self.runs]
         self._places = [self._place(run) for run in self.runs]
+
+    def stacked(self, signals: Sequence[Array]) -> Array:
+        """Signals of the runs, shape (run, sample), each with its last value after its end."""
+        return np.stack([np.pad(x, (0, self.samples - len(x)), mode="edge") for x in signals])
 
     def limits(self, limits: Array, free: Sequence[str]) -> Array:
         """Return limits of parameters, shape (2, p), those of the offset by the ranges of the joint."""
@@ -129,11 +133,6 @@ def count_of(runs: Sequence[ServoRun]) -> float:
         return 0.0
     x = np.concatenate([run.q / run.servo.count for run in runs if run.servo.count])
     return count if np.mean(np.abs(x - np.rint(x)) < IN_COUNTS) > 1 - IN_COUNTS else 0.0
-
-
-def _padded(x: npt.NDArray[Any], length: int, value: Any = None) -> npt.NDArray[Any]:
-    """Return values with the last one, or another value, after their end."""
-    return np.concatenate([x, np.full(length - len(x), x[-1] if value is None else value, x.dtype)])
 
 
 def _centred(x: Array) -> Array:
