@@ -100,7 +100,7 @@ class ServoLoop:
         begin = self._begin[k]
         starts = begin.state + ahead * begin.per_angle
         servo = self.runs[k].servo
-        firmware = Firmware(servo.slope, servo.kd, servo.limit, servo.speed_limit, servo.count, *servo.steps)
+        firmware = Firmware(servo.slope, servo.kd, servo.limit, servo.speed_limit, servo.count, servo.steps)
         for lane, (law, start) in enumerate(zip(laws, starts.tolist(), strict=True)):
             path = motion(law, firmware, self._tracks[k], tuple(start), self.h, self._fastest)
             out[lane, : len(before)] = at_samples(path, before, share, self.count)

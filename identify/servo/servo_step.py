@@ -8,6 +8,7 @@ import numpy.typing as npt
 
 from idbench.identify.arrays import Array
 from idbench.identify.compiled import compiled
+from idbench.identify.servo.law import TimeSteps
 
 LIGHT = 1e-9  # Inertia of a link that has none, beside that of its rotor
 
@@ -52,12 +53,7 @@ class Firmware(NamedTuple):
     limit: float
     speed_limit: float
     angle: float
-    of_joint: float = 0.0
-    of_loop: float = 0.0
-    early: float = 0.0
-    step: float = 0.0
-    yielding: float = 0.0
-    decay: float = 0.0
+    steps: TimeSteps
 
 
 class Track(NamedTuple):
@@ -149,18 +145,18 @@ def _pushed(
 def _after(p: ServoLaw, firmware: Firmware, of: Acting, speed: float, h: float) -> float:
     """Return the speed of rotor and link as one body after a step."""
     damping = p.b * of.on + of.damping
-    light = 1 / (of.J + p.Ia + firmware.of_joint * p.Fv + firmware.of_loop * damping)
+    light = 1 / (of.J + p.Ia + firmware.steps.joint * p.Fv + firmware.steps.loop * damping)
     half = h / 2 * (damping + p.Fv) * light
     later = h * light / (1 + half)
     free = speed + later * (of.push + of.external - (damping + p.Fv) * speed)
     motor = of.push - damping * speed
     sent = math.copysign(light, free) * (of.J * motor - p.Ia * of.external)
     resisting = friction(p, speed, motor, of.external, sent) + p.Fo * (1 - of.on)
-    if firmware.decay > 0.0:  # MuJoCo's, which lets a joint creep: (a + B v) / (A + R) within the largest
-        taken = 2 * (max(firmware.of_joint, 0.0) * p.Fv + max(firmware.of_loop, 0.0) * damping)
+    if firmware.steps.decay > 0.0:  # MuJoCo's, which lets a joint creep: (a + B v) / (A + R) within the largest
+        taken = 2 * (max(firmware.steps.joint, 0.0) * p.Fv + max(firmware.steps.loop, 0.0) * damping)
         A = (1 + taken * of.lightness) / (of.J + p.Ia + taken)
-        seen = later * (firmware.decay * speed + of.shaking)
-        wanted = (A * (free - speed) + seen) / (A + firmware.yielding)
+        seen = later * (firmware.steps.decay * speed + of.shaking)
+        wanted = (A * (free - speed) + seen) / (A + firmware.steps.yielding)
         return free - min(max(wanted, -later * resisting), later * resisting)
     return _slowed(free, speed, later * resisting)
 
@@ -218,7 +214,7 @@ def motion(p: ServoLaw, firmware: Firmware, track: Track, start: tuple[float, fl
     q, speed, ahead = start
     out, means = np.empty(n), targets(track.command, p.rate, h, p.lag, ahead)
     first = track.command[0] + ahead
-    late = (p.delay - firmware.early) / h + 0.5
+    late = (p.delay - firmware.steps.early) / h + 0.5
     whole = math.floor(late)
     part, half = late - whole, p.backlash / 2
     q += p.offset
