@@ -106,8 +106,7 @@ class ServoFit:
     def bound(self) -> dict[str, float]:
         """Standard errors that the rounding of the encoder alone leaves (Cramer-Rao)."""
         J, n = self.found.sensitivity, len(self.free)
-        rounded = replace(self.found.beginning, certainty=1.0)
-        free = rounded.weighted(np.ones(J.shape[:2])).without(J).reshape(-1, n)
+        free = replace(self.found.beginnings, P=1.0).without(J).reshape(-1, n)
         J = J.reshape(-1, n)
         size = np.sqrt((J**2).sum(axis=0))
         size = np.where(size > 0, size, 1.0)

@@ -47,7 +47,7 @@ def per_offset(fit: ServoFit, runs: Sequence[ServoRun], other: Sequence[ServoRun
     with one_thread():
         q, moved = (ServoLoop(runs, fit.loop.h).simulate(fit.p)[0] for runs in (runs, other))
     w = (1 + np.abs(found.residual) / (3 * fit.scale)) ** -2
-    free = found.beginning.weighted(w).without(found.sensitivity / size) * w[..., None]
+    free = replace(found.beginnings, w=w).without(found.sensitivity / size) * w[..., None]
     curvature = np.einsum("rti,rtj->ij", free, found.sensitivity / size)
     pull = np.einsum("rti,rt->i", free, (q - moved) / APART * fit.loop.kept)
     return np.asarray(np.linalg.pinv(curvature, 1e-12) @ pull / size)

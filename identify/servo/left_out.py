@@ -1,6 +1,6 @@
 """What a fit of a servo is without each of its parts: covariance of the parameters, errors of what was left out."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -51,7 +51,7 @@ def left_out(found: Found, loop: ServoLoop, c: float, parts: int) -> LeftOut:
     size = np.where(size > 0, size, 1.0)
     J = J / size
     w = 1 / (1 + np.abs(r) / c)
-    free = found.beginning.weighted(w**2).without(J)  # w**2: the weight of Fair's function, the derivative of r w
+    free = replace(found.beginnings, w=w**2).without(J)  # w**2: the weight of Fair's function, the derivative of r w
     scores = _summed(free * (w * r)[..., None], parts)
     curvatures = _summed(np.einsum("rti,rtj->rtij", free * (w**2)[..., None], J), parts)
     S, inverse, without = _jackknife(scores, curvatures)

@@ -5,7 +5,7 @@ steps mislead, wide ones, and samples spread as the normal equations say, go on.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import ndtri
@@ -30,22 +30,6 @@ WILD = 4.0  # Times its typical size from which on the sensitivity of a sample c
 
 
 @dataclass(frozen=True, eq=False)
-class Beginning:
-    """How runs begin: the encoder says that to a count, and where torque is off nothing makes a run forget it."""
-
-    ahead: Array
-    """Beside what was measured (see `Begin`) [rad], shape (run, 3)."""
-    sensitivity: Array
-    """Of the simulated positions to it, shape (run, sample, 3)."""
-    certainty: float
-    """Variance of residuals over that of a position that was rounded."""
-
-    def weighted(self, w: Array) -> Nuisances:
-        """Return other beginnings as unknowns of runs whose samples have weights w, shape (run, sample)."""
-        return Nuisances(self.sensitivity, self.certainty, w)
-
-
-@dataclass(frozen=True, eq=False)
 class Found:
     """The best parameters of a search."""
 
@@ -57,8 +41,11 @@ class Found:
     """Measured minus simulated positions [rad], shape (run, sample)."""
     sensitivity: Array
     """Of the simulated positions to the free parameters, shape (run, sample, parameter)."""
-    beginning: Beginning
-    """Where runs begin."""
+    ahead: Array
+    """Where runs begin beside what was measured (see `Begin`) [rad], shape (run, 3)."""
+    beginnings: Nuisances
+    """Other beginnings as unknowns: the encoder says them to a count, and where torque is off nothing makes a run forget them.
+    Their precision is the variance of residuals over that of a position that was rounded."""
 
 
 class ServoSearch:
@@ -108,8 +95,8 @@ class ServoSearch:
         spread = 1.0
         rng = np.random.default_rng(0)  # the same samples for everybody
         for _ in range(rounds):
-            tried, cost, J, r, beginning = self._differences(start, x, ahead, width)
-            normal = self._normal(J, r, beginning)
+            tried, cost, J, r, beginnings = self._differences(start, x, ahead, width)
+            normal = self._normal(J, r, ahead, beginnings)
             steps, promised = self._steps(normal, damping), float(normal.gradient @ normal.inverse @ normal.gradient)
             scattered = self._scattered(rng, normal, spread * np.sqrt(0.02 * cost[0] / len(x)))
             more = self._within(x, np.concatenate([steps, scattered]))
@@ -134,17 +121,17 @@ class ServoSearch:
 
     def at(self, found: Found) -> Found:
         """Return residuals and sensitivities where another search ended."""
-        return self._found(found.p, found.beginning.ahead, 0.5)
+        return self._found(found.p, found.ahead, 0.5)
 
     def _found(self, p: dict[str, float], ahead: Array, width: float) -> Found:
         x = np.array([p[name] for name in self.free])
-        _, cost, J, r, beginning = self._differences(p, x, ahead, width)
-        return Found(p, float(cost[0]), r, J, beginning)
+        _, cost, J, r, beginnings = self._differences(p, x, ahead, width)
+        return Found(p, float(cost[0]), r, J, ahead, beginnings)
 
     def away(self, found: Found) -> list[dict[str, float]]:
         """Return parameters on both sides of what was found, along the axes that are known worst: other valleys lie there."""
         x = np.array([found.p[name] for name in self.free])
-        normal = self._normal(found.sensitivity, found.residual, found.beginning)
+        normal = self._normal(found.sensitivity, found.residual, found.ahead, found.beginnings)
         values, axes = np.linalg.eigh((normal.A + normal.A.T) / 2)
         seen = values > UNSEEN  # along others, nothing changes however far one goes
         values, axes = values[seen][:WORST], axes[:, seen]
@@ -169,8 +156,8 @@ class ServoSearch:
 
     def _differences(
         self, start: Mapping[str, float], x: Array, ahead: Array, width: float
-    ) -> tuple[Array, Array, Array, Array, Beginning]:
-        """Return points about x, their costs, sensitivity and residual at x, and what other beginnings do."""
+    ) -> tuple[Array, Array, Array, Array, Nuisances]:
+        """Return points about x, their costs, sensitivity and residual at x, and other beginnings as unknowns."""
         h = width * np.array([step_of(name, value, self._scales) for name, value in zip(self.free, x, strict=True)])
         upper = x + np.diag(h)
         lower = np.maximum(x - np.diag(h), self._low)
@@ -183,15 +170,15 @@ class ServoSearch:
         wide = np.where(wide > 0, wide, np.inf)  # what has come to zero, in steps of shares of itself, has no effect
         J = np.moveaxis(q[1 : n + 1] - q[n + 1 : 2 * n + 1], 0, -1) / wide * kept[..., None]
         apart = np.moveaxis(q[-2 * STATES : -STATES] - q[-STATES:], 0, -1) / self._count
-        beginning = Beginning(ahead, apart * kept[..., None], self._certainty)
-        return tried, self.cost(q[: -2 * STATES], ahead), J, (self._loop.q - q[0]) * kept, beginning
+        beginnings = Nuisances(apart * kept[..., None], self._certainty)
+        return tried, self.cost(q[: -2 * STATES], ahead), J, (self._loop.q - q[0]) * kept, beginnings
 
-    def _normal(self, J: Array, r: Array, beginning: Beginning) -> "_Normal":
+    def _normal(self, J: Array, r: Array, ahead: Array, beginnings: Nuisances) -> "_Normal":
         w = 1 / (1 + np.abs(r) / self.c)
         typical = np.sqrt(np.median((J**2).mean(axis=1), axis=0))
         typical = np.where(typical > 0, typical, np.sqrt((J**2).mean(axis=(0, 1))) + 1e-12)
         w = w / (1 + ((J / typical) ** 2).mean(axis=-1) / WILD**2)
-        return _Normal(J, r, w, beginning)
+        return _Normal(J, r, w, ahead, replace(beginnings, w=w))
 
     def _steps(self, normal: "_Normal", damping: float) -> Array:
         eye = np.eye(len(normal.size))
@@ -211,16 +198,16 @@ class _Normal:
     `A` is scaled to ones on its diagonal but for what beginnings take, `gradient` likewise, by `size`.
     """
 
-    def __init__(self, J: Array, r: Array, w: Array, beginning: Beginning) -> None:
-        begins, p = beginning.weighted(w), J.shape[-1]
+    def __init__(self, J: Array, r: Array, w: Array, ahead: Array, begins: Nuisances) -> None:
+        p = J.shape[-1]
         known = np.concatenate([J, r[..., None]], axis=-1)
         follow, free = begins.following(known), begins.without(known).reshape(-1, p + 1)
         both = (J * w[..., None]).reshape(-1, p).T @ free
-        self._follow, self._pull = follow[..., :p], follow[..., p] - begins.drawn(beginning.ahead)
+        self._follow, self._pull = follow[..., :p], follow[..., p] - begins.drawn(ahead)
         A = both[:, :p]
         self.size = np.sqrt(np.maximum(np.diagonal(A), 1e-24))
         self.A = A / np.outer(self.size, self.size)
-        self.gradient = (both[:, p] + beginning.certainty * np.einsum("rkp,rk->p", self._follow, beginning.ahead)) / self.size
+        self.gradient = (both[:, p] + begins.P * np.einsum("rkp,rk->p", self._follow, ahead)) / self.size
         self.inverse = np.linalg.pinv(self.A, 1e-6, hermitian=True)
 
     def begin(self, steps: Array) -> Array:

@@ -17,7 +17,7 @@ PLACE = FREE.index("offset")
 
 def fit_of(covariance, free=FREE):
     p = dict(zip(FREE, [10.0, 0.0, 0.0] + 0.2 * RNG.normal(size=3), strict=True))  # far from all limits
-    found = Found(p, 0.0, None, None, None)
+    found = Found(p, 0.0, None, None, None, None)
     loop = SimpleNamespace(limits=lambda limits, free: limits)
     return ServoFit("coulomb", free, found, loop, None, (np.inf, np.inf), covariance)
 

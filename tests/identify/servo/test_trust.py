@@ -179,8 +179,8 @@ def test_a_friction_next_to_nothing_sets_no_scale():
 @pytest.mark.thorough
 def test_where_no_parameter_has_an_effect_no_other_valley_is_tried(fit):
     search = ServoSearch(fit.loop, fit.free, fit.excitation.scales, fit.scale)
-    nothing = replace(fit.found.beginning, sensitivity=np.zeros_like(fit.found.beginning.sensitivity))
-    still = replace(fit.found, sensitivity=np.zeros_like(fit.found.sensitivity), beginning=nothing)
+    nothing = replace(fit.found.beginnings, K=np.zeros_like(fit.found.beginnings.K))
+    still = replace(fit.found, sensitivity=np.zeros_like(fit.found.sensitivity), beginnings=nothing)
     assert search.away(still) == [fit.p]
 
 
