@@ -103,11 +103,12 @@ def choose_friction(
     first = next(iter(fits))
     chosen, p = first, dict[str, float]()
     for law in [law for law in fits if law != first]:
-        p[law] = _p(costs[law], costs[first], tests)
-        if costs[law].mean() < costs[chosen].mean() and _p(costs[law], costs[chosen], tests) < LEVEL:
+        p[law] = p_value(costs[law], costs[first], tests)
+        if costs[law].mean() < costs[chosen].mean() and p_value(costs[law], costs[chosen], tests) < LEVEL:
             chosen = law
     return ServoFrictionChoice(fits, chosen, {law: float(np.sqrt(x.mean())) for law, x in costs.items()}, p)
 
 
-def _p(one: Array, other: Array, tests: int) -> float:
+def p_value(one: Array, other: Array, tests: int) -> float:
+    """P value of Wilcoxon's signed-rank test of paired costs, times the number of tests (Bonferroni)."""
     return min(1.0, tests * float(wilcoxon(one, other).pvalue))

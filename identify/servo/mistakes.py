@@ -4,9 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import wilcoxon
 
-from idbench.identify.servo.choice import LEVEL, residuals_by_state
+from idbench.identify.servo.choice import LEVEL, p_value, residuals_by_state
 from idbench.identify.servo.fit import CLUSTERS, ServoFit
 from idbench.identify.servo.left_out import left_out, stretches
 from idbench.identify.servo.parameters import SERVO_PARAMETERS
@@ -77,7 +76,7 @@ def mistake_of(fit: ServoFit) -> ServoMistake | None:
     c, parts = 3 * fit.scale, stretches(fit.found, fit.loop, CLUSTERS * len(names))
     before, after = (left_out(x.found, x.loop, c, parts).costs for x in (fit, other))
     errors = float(np.sqrt(before.mean())), float(np.sqrt(after.mean()))
-    p = min(1.0, len(tried) * float(wilcoxon(before, after).pvalue))
+    p = p_value(before, after, len(tried))
     if errors[1] > (1 - GAINED) * errors[0] or p >= LEVEL or other.scale > REMAINING * fit.excitation.range:
         return None
     explained = {name: glances[""].cost - found[name].cost for name in order}
