@@ -82,7 +82,7 @@ class ServoSearch:
         )
         return np.nan_to_num(total, nan=np.inf, posinf=np.inf)
 
-    def best(self, start: Mapping[str, float], rounds: int = 30) -> Found:
+    def best(self, start: Mapping[str, float], rounds: int) -> Found:
         """Return the best parameters that are found from a start.
 
         Levenberg and Marquardt, x(k+1) = x(k) - (J' J + mu D)^-1 J' r, initial positions eliminated (Schur complement);

@@ -1,6 +1,6 @@
 """The stages of a servo's identification: from rows to the closed loop, with more parameters and in finer steps."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from itertools import product
 from typing import Self
@@ -29,7 +29,11 @@ NEAR = 1.1, 1.03  # Factors on all torques by which the last stage goes along th
 NARROW = 3.0
 """Contrast below which it does: the valley is so long there that a search of all parameters ended 5 % from the best scale."""
 
+ROUNDS = 30  # Rounds of the first stages, at most
 REFINED = 15  # Rounds of the last stage, at most
+
+Others = Callable[[ServoSearch, Found], list[dict[str, float]]]
+"""Returns parameters elsewhere than where a search ended."""
 
 
 class Valleys:
@@ -52,42 +56,34 @@ class Valleys:
 
     def from_start(self, p: Mapping[str, float], free: Sequence[str]) -> Found:
         """Return p = argmin cost in coarse steps, again from shaken starts, until cost(k+1) > (1 - ESCAPED) cost(k)."""
-        found = self._search(self._coarse, p, free).best(p)
-        for _ in range(SHAKEN):
-            search = self._search(self._coarse, found.p, free)
-            best = min((search.best(other) for other in self._shaken(search, found.p)), key=lambda other: other.cost)
-            if best.cost > (1 - ESCAPED) * search.at(found).cost:
-                break
-            found = best
-        return found
+        found = self.near(self._coarse, p, free, ROUNDS)
+        return self._escaped(self._coarse, free, found, self._shaken, ROUNDS)
 
-    def near(self, p: Mapping[str, float], free: Sequence[str], rounds: int) -> Found:
-        """Best parameters near a start, in coarse steps within its valley."""
-        return self._search(self._coarse, p, free).best(p, rounds)
+    def near(self, loop: ServoLoop, p: Mapping[str, float], free: Sequence[str], rounds: int = REFINED) -> Found:
+        """Best parameters near a start, in the steps of the loop within its valley."""
+        return self._search(loop, p, free).best(p, rounds)
 
     def refined(
         self, loop: ServoLoop, p: Mapping[str, float], free: Sequence[str], many: bool
     ) -> tuple[Found, tuple[float, float]]:
         """Fit in the steps of the loop, with its contrasts (see `ServoFit`)."""
-        found = self.again(loop, p, free)
+        found = self.near(loop, p, free)
+        if not many:
+            found = self._escaped(loop, free, found, ServoSearch.away, ASIDE)
         if "a" not in free:
-            return found if many else self._better(loop, free, found), (np.inf, np.inf)
+            return found, (np.inf, np.inf)
         if many:  # on a real bench, a scale that fitted 1 % better predicted another mass 8 % worse
             return found, self._scaled(free, found.p)[1]
-        found, contrasts = self._of_scale(loop, free, self._better(loop, free, found))
+        found, contrasts = self._of_scale(loop, free, found)
         return self._along(loop, free, found) if min(contrasts) < NARROW else found, contrasts
-
-    def again(self, loop: ServoLoop, p: Mapping[str, float], free: Sequence[str]) -> Found:
-        """Fit in the steps of the loop, within its valley."""
-        return self._search(loop, p, free).best(p, REFINED)
 
     def at(self, loop: ServoLoop, found: Found, free: Sequence[str]) -> Found:
         """Return residuals and sensitivities in another loop."""
         return self._search(loop, found.p, free).at(found)
 
-    def _shaken(self, search: ServoSearch, p: dict[str, float]) -> list[dict[str, float]]:
-        """Return the best of parameters in other valleys: a rotor that is light looks like a command that is late."""
-        base = {**p, "Ia": max(p["Ia"], p["b"] * self._excitation.T / 2)}
+    def _shaken(self, search: ServoSearch, found: Found) -> list[dict[str, float]]:
+        """Return parameters in other valleys: a rotor that is light looks like a command that is late."""
+        base = {**found.p, "Ia": max(found.p["Ia"], found.p["b"] * self._excitation.T / 2)}
         T, held = self._excitation.T, self._held
         tried = []
         scales = SCALES if "a" in search.free else (1.0,)  # torques that are known have one
@@ -95,18 +91,15 @@ class Valleys:
             torques = {name: x * scale for name, x in base.items() if name in TORQUES}
             late = base["delay"] + delay * T
             tried.append({**base, **torques, "Ia": base["Ia"] * Ia, "delay": late, "offset": offset, **held})
-        tried = [dict(each) for each in {tuple(other.items()): None for other in tried} if dict(each) != base]
-        lanes = {name: np.array([x[name] for x in tried]) for name in base}
-        order = np.argsort(search.cost(self._coarse.simulate(lanes)))[:VALLEYS]
-        return [tried[int(k)] for k in order]
+        return [dict(each) for each in {tuple(other.items()): None for other in tried} if dict(each) != base]
 
-    def _better(self, loop: ServoLoop, free: Sequence[str], found: Found) -> Found:
-        """Return the best of searches from p +- sigma v, v the worst known axes, while cost(k+1) < (1 - ESCAPED) cost(k)."""
+    def _escaped(self, loop: ServoLoop, free: Sequence[str], found: Found, others: Others, rounds: int) -> Found:
+        """Return the best of searches from the likeliest of other places, while cost(k+1) < (1 - ESCAPED) cost(k)."""
         for _ in range(SHAKEN):
             search = self._search(loop, found.p, free)
-            tried = search.away(found)
-            cost = search.cost(loop.simulate({name: np.array([x[name] for x in tried]) for name in tried[0]}))
-            best = min((search.best(tried[int(k)], ASIDE) for k in np.argsort(cost)[:VALLEYS]), key=lambda other: other.cost)
+            tried = others(search, found)
+            cost = search.cost(loop.simulate({name: np.array([x[name] for x in tried]) for name in found.p}))
+            best = min((search.best(tried[int(k)], rounds) for k in np.argsort(cost)[:VALLEYS]), key=lambda other: other.cost)
             if best.cost > (1 - ESCAPED) * search.at(found).cost:
                 break
             found = best
@@ -224,8 +217,8 @@ class Stages:
     def beside(self, free: tuple[str, ...], p: Mapping[str, float], tried: Sequence[str], rounds: int) -> dict[str, Found]:
         """Coarse fits with each of further parameters, and without any (as "")."""
         with one_thread():
-            found = {"": self._valleys.near(p, free, rounds)}
-            return found | {name: self._valleys.near({**p, name: 0.0}, (*free, name), rounds) for name in tried}
+            found = {"": self._valleys.near(self._coarse, p, free, rounds)}
+            return found | {name: self._valleys.near(self._coarse, {**p, name: 0.0}, (*free, name), rounds) for name in tried}
 
     def fit(self, friction: str, more: Sequence[str], p: dict[str, float]) -> ServoFit:
         """Return the fit of all runs, in fine steps."""
@@ -248,7 +241,7 @@ class Stages:
             if contrasts is None:
                 found, contrasts = self._valleys.refined(loop, p, free, many=not self._few)
             else:
-                found = self._valleys.again(loop, p, free)
+                found = self._valleys.near(loop, p, free)
             # At rest, rounded positions change by a count or not at all: what parameters do to them shows without rounding.
             exact = ServoLoop(self._whole, step)
             unrounded = self._valleys.at(exact, found, free)
