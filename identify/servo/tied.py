@@ -30,24 +30,20 @@ def tied(fits: Mapping[int, ServoFit]) -> dict[int, ServoFit]:
     if len(fits) < 2 or not common:
         return dict(fits)
     places = {j: [fit.free.index(name) for name in common] for j, fit in fits.items()}
-    M = {j: _curvature(fit, places[j]) for j, fit in fits.items()}
+    inverses = {j: left_out(fit.found, fit.loop, 3 * fit.scale, 1).inverse for j, fit in fits.items()}  # of curvatures
+    M = {j: np.linalg.pinv(_part(inverses[j], places[j]), hermitian=True) / fit.scale**2 for j, fit in fits.items()}
+    C = {j: _part(fit.covariance, places[j]) for j, fit in fits.items()}
     own = {j: np.array([fit.p[name] for name in common]) for j, fit in fits.items()}
     whole = np.linalg.pinv(sum(M.values(), np.zeros((len(common), len(common)))), hermitian=True)
     c = whole @ sum((M[j] @ own[j] for j in fits), np.zeros(len(common)))
-    inner = sum((M[j] @ _part(fit.covariance, places[j]) @ M[j] for j, fit in fits.items()), np.zeros_like(whole))
-    S = whole @ inner @ whole * _spread(c, own, {j: _part(fit.covariance, places[j]) for j, fit in fits.items()})
+    inner = sum((M[j] @ C[j] @ M[j] for j in fits), np.zeros_like(whole))
+    S = whole @ inner @ whole * _spread(c, own, C)
     shared = dict(zip(common, c.tolist(), strict=True))
-    return {j: _with(fit, shared, places[j], S) for j, fit in fits.items()}
+    return {j: _with(fit, shared, places[j], S, inverses[j]) for j, fit in fits.items()}
 
 
 def _part(C: Array, places: list[int]) -> Array:
     return C[np.ix_(places, places)]
-
-
-def _curvature(fit: ServoFit, places: list[int]) -> Array:
-    """Return the curvature of the objective in some parameters while the others follow, over the variance of residuals."""
-    inverse = left_out(fit.found, fit.loop, 3 * fit.scale, 1).inverse
-    return np.asarray(np.linalg.pinv(_part(inverse, places), hermitian=True) / fit.scale**2)
 
 
 def _spread(c: Array, own: Mapping[int, Array], C: Mapping[int, Array]) -> float:
@@ -56,14 +52,13 @@ def _spread(c: Array, own: Mapping[int, Array], C: Mapping[int, Array]) -> float
     return max(1.0, float(np.sum(z**2)) / (len(c) * (len(own) - 1)))
 
 
-def _with(fit: ServoFit, shared: Mapping[str, float], places: list[int], S: Array) -> ServoFit:
-    """Return the fit of a joint whose motor is known, with the covariance that follows."""
+def _with(fit: ServoFit, shared: Mapping[str, float], places: list[int], S: Array, H: Array) -> ServoFit:
+    """Return the fit of a joint whose motor is known, with the covariance that follows; H: inverse of its curvature."""
     others = [k for k in range(len(fit.free)) if k not in places]
     free = tuple(fit.free[k] for k in others)
     p = {**fit.p, **shared}
     held = {name: x for name, x in p.items() if name not in free}
     again = Stages(fit.loop.runs, held, p, cut=False).last(fit.friction, free, p, fit.contrasts)
-    H = left_out(fit.found, fit.loop, 3 * fit.scale, 1).inverse
     follow = H[np.ix_(others, places)] @ np.linalg.pinv(
         _part(H, places), hermitian=True
     )  # how parameters of the joint follow its motor's
