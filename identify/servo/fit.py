@@ -14,7 +14,7 @@ from idbench.identify.servo.excitation import Excitation
 from idbench.identify.servo.law import Servo
 from idbench.identify.servo.left_out import LeftOut, left_out, stretches
 from idbench.identify.servo.parameters import SERVO_PARAMETERS
-from idbench.identify.servo.run import ServoRun
+from idbench.identify.servo.run import ServoRun, part_of
 from idbench.identify.servo.search import Found
 
 CLUSTERS = 2  # Clusters per parameter: where there are fewer runs, or pieces of them, these are cut into stretches of time
@@ -128,13 +128,7 @@ class ServoFit:
         """Return the steps of a simulation [s], on the clock of a run, and its positions from its commands alone [rad]."""
         t = np.arange(run.t[0], run.t[-1], self.loop.h)
         place = np.searchsorted(run.t, t + 1e-9, side="right") - 1
-        on = run.enabled[place]
-        held = (run.command, run.voltage, run.forward)
-        command, voltage, forward = (None if x is None else x[place] for x in held)
-        assert command is not None
-        q = np.interp(t, run.t, run.clean)
-        finer = replace(run, t=t, q=q, command=command, on=on, voltage=voltage, forward=forward)
-        return t, self.simulate([finer])[0]
+        return t, self.simulate([part_of(run, place, t=t, q=np.interp(t, run.t, run.clean))])[0]
 
     def errors(self, runs: Sequence[ServoRun]) -> Array:
         """Return the mean absolute error of each run's position, simulated from its commands alone [rad], without spikes.

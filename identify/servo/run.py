@@ -230,7 +230,7 @@ def pieces(run: ServoRun, delay: float) -> list[ServoRun]:
             cuts.append(int(k))
     if len(cuts) > 1 and (t[-1] - t[cuts[-1]] < SHORTEST or len(t) - cuts[-1] < MIN_SAMPLES):
         cuts.pop()
-    parts = [_part(run, slice(a, b)) for a, b in zip(cuts, [*cuts[1:], len(t)], strict=True)]
+    parts = [part_of(run, slice(a, b)) for a, b in zip(cuts, [*cuts[1:], len(t)], strict=True)]
     moving = [part for part in parts if np.ptp(part.clean) > MOVES * step]
     return moving or parts[:1]
 
@@ -248,6 +248,7 @@ def _rests(run: ServoRun, some: slice, step: float) -> bool:
     return bool(steady and np.ptp(run.clean[some]) <= 1.5 * step)
 
 
-def _part(run: ServoRun, some: slice) -> ServoRun:
+def part_of(run: ServoRun, some: slice | npt.NDArray[np.intp], **others: Array) -> ServoRun:
+    """Return some samples of a run, with other values of some of its signals."""
     names = ("t", "q", "command", "on", "voltage", "forward")
-    return replace(run, **{name: x[some] for name in names if (x := getattr(run, name)) is not None})
+    return replace(run, **{name: x[some] for name in names if (x := getattr(run, name)) is not None} | others)
