@@ -4,7 +4,7 @@ import re
 from math import isfinite, isnan
 from pathlib import Path
 
-from idbench.experiments.exports.code import Content, Language, body, identifiers
+from idbench.experiments.exports.code import OPERATIONS, Content, Language, body, identifiers
 from idbench.experiments.exports.functions import Function
 
 OF_INTERVAL = {
@@ -14,16 +14,7 @@ OF_INTERVAL = {
 }
 """Parts of an interval -> fields, and what they are."""
 
-OPERATIONS = {
-    "+": "({} + {})",
-    "-": "({} - {})",
-    "*": "({} * {})",
-    "/": "({} / {})",
-    "negate": "(-{})",
-    ">": "({} > {})",
-    "<": "({} < {})",
-    ">=": "({} >= {})",
-    "<=": "({} <= {})",
+OF_C = {
     "where": "({} ? {} : {})",
     "abs": "fabs({})",
     "max": "fmax({}, {})",
@@ -106,7 +97,7 @@ int {name}_outside_fit(const {name}_real *q, const {name}_real *qd, const {name}
 
 def _source(content: Content, name: str, header: str) -> str:
     language = Language(
-        OPERATIONS,
+        OPERATIONS | OF_C,
         lambda x: f"(real){_number(x)}" if x >= 0 else f"((real){_number(x)})",
         lambda step: content.input(step, "p->{}", "p->{}[{}]" if step[1] in content.functions.used else "{}[{}]"),
         "    const real {} = {};",

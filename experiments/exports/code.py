@@ -23,6 +23,20 @@ RESERVED = frozenset({*keyword.kwlist, *C_WORDS.split(), "half_width", "fitted_s
 """What no parameter can be called in the code."""
 
 
+OPERATIONS = {
+    "+": "({} + {})",
+    "-": "({} - {})",
+    "*": "({} * {})",
+    "/": "({} / {})",
+    "negate": "(-{})",
+    ">": "({} > {})",
+    "<": "({} < {})",
+    ">=": "({} >= {})",
+    "<=": "({} <= {})",
+}
+"""What all languages write alike: templates of operands."""
+
+
 @dataclass(frozen=True)
 class Language:
     """How a language writes formulas."""

@@ -5,21 +5,8 @@ from math import isfinite, isnan
 from pprint import pformat
 from textwrap import fill
 
-from idbench.experiments.exports.code import Content, Language, body
+from idbench.experiments.exports.code import OPERATIONS, Content, Language, body
 from idbench.experiments.exports.functions import Function
-
-OPERATIONS = {
-    "+": "({} + {})",
-    "-": "({} - {})",
-    "*": "({} * {})",
-    "/": "({} / {})",
-    "**": "({} ** {})",
-    "negate": "(-{})",
-    ">": "({} > {})",
-    "<": "({} < {})",
-    ">=": "({} >= {})",
-    "<=": "({} <= {})",
-}
 
 TAB = 4 * " "  # How lines are indented
 
@@ -126,7 +113,7 @@ def python_text(content: Content) -> str:
     """Return the module."""
     of = content.functions
     language = Language(
-        OPERATIONS,
+        OPERATIONS | {"**": "({} ** {})"},
         _constant,
         lambda step: content.input(step, "p.{}", "p.{}[{}]" if step[1] in of.used else "{}_{}"),
         "    {} = {}",
