@@ -214,7 +214,7 @@ class Ensemble:
         if count < 1:
             raise IdentificationError(f"a log of {log.samples / log.fs:.3g} s has no run of {LENGTH:g} s")
         first = samples * np.unique(np.linspace(0, count - 1, min(count, STRETCHES)).astype(np.intp))
-        draws, fields = len(next(iter(standard.values()))), _fields(robot, standard)
+        draws, fields = len(next(iter(standard.values()))), fields_of(robot, standard)
         size, gain = spread * np.nan_to_num(self.estimate.noise_levels.position), self.fit.processing.signals(log).gain
         each = max(1, MOST // (draws * samples * log.n))
         found = list[Array]()
@@ -263,6 +263,7 @@ def notes(ensemble: Ensemble) -> list[str]:
     return [wider, *(found or ["free runs were not judged: name a log with its motion and torques by --validate"])]
 
 
-def _fields(robot: Robot, standard: Mapping[str, Array]) -> dict[str, Array]:
+def fields_of(robot: Robot, standard: Mapping[str, Array]) -> dict[str, Array]:
+    """Return MuJoCo's fields of robots with these standard parameters, of those that a robot has."""
     known = standard_parameters(robot)
     return model_fields(robot, {name: x for name, x in standard.items() if name in known})

@@ -7,12 +7,10 @@ from typing import Any
 import numpy as np
 import tomli_w
 
-from idbench.experiments.exports.ensemble import DRAWS, LENGTH, Ensemble, FreeRuns
+from idbench.experiments.exports.ensemble import DRAWS, LENGTH, Ensemble, FreeRuns, fields_of
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.reports.panels import Panel, stacked
 from idbench.identify import Array
-from idbench.sim.robot.tree import standard_parameters
-from idbench.sim.robot.varied import model_fields
 
 PICTURE = "_band.svg"  # Ending of the name of the picture of the band
 QUANTILES = (0.025, 0.5, 0.975)  # The middle of a value, and the ends of the range that holds 95 % of the robots
@@ -55,10 +53,8 @@ def picture(runs: FreeRuns, robot_model: RobotModel) -> str:
 
 def ranges(ensemble: Ensemble) -> dict[str, Any]:
     """Return mean, sigma and quantiles of the values of joints and bodies, and how these are correlated."""
-    robot_model, standard = ensemble.fit.robot_model, ensemble.standard
-    robot = robot_model.robot
-    known = standard_parameters(robot)
-    fields = model_fields(robot, {name: x for name, x in standard.items() if name in known})
+    robot = ensemble.fit.robot_model.robot
+    fields = fields_of(robot, ensemble.standard)
     sizes, times = ensemble.disturbance
     joints: dict[str, Any] = {}
     bodies: dict[str, Any] = {}
