@@ -25,8 +25,9 @@ def texts(ensemble: Ensemble, path: Path) -> dict[Path, str]:
     table = ranges(ensemble)
     about = f"{ensemble.fit.robot_model.tree.name}, identified by idbench {version('idbench')}"
     made = {path: tomli_w.dumps(table)}
-    for ending, make in CODE.items():
-        made[path.with_name(path.stem + ending)] = make(table, about)
+    for ending, (target, code) in CODE.items():
+        head = HEAD.format(about=about, target=target, draws=DRAWS)
+        made[path.with_name(path.stem + ending)] = head + code.replace("{tables}", _tables(table))
     if ensemble.bands:
         made[path.with_name(path.stem + PICTURE)] = picture(ensemble.bands[0], ensemble.fit.robot_model)
     return made
@@ -111,16 +112,14 @@ def _short(x: Any) -> float:
     return float(f"{float(x):.{DIGITS}g}")
 
 
-def _pairs(table: dict[str, Any], part: str, value: str) -> str:
-    """Return the ranges of a value of joints or bodies, as code."""
-    found = {name: (own[value]["low"], own[value]["high"]) for name, own in table[part].items()}
-    return "{\n" + "".join(f"    {name!r}: {ends},\n" for name, ends in found.items()) + "}"
-
-
 def _tables(table: dict[str, Any]) -> str:
-    values = {**dict.fromkeys(JOINT, "joints"), "mass": "bodies"}
-    lines = [f"{value.upper()} = {_pairs(table, part, value)}\n" for value, part in values.items()]
-    return "\n".join(lines)
+    """Return the ranges of values of joints and bodies, as code."""
+    texts = []
+    for value, part in {**dict.fromkeys(JOINT, "joints"), "mass": "bodies"}.items():
+        ends = {name: (own[value]["low"], own[value]["high"]) for name, own in table[part].items()}
+        rows = "".join(f"    {name!r}: {low_high},\n" for name, low_high in ends.items())
+        texts.append(f"{value.upper()} = {{\n{rows}}}\n")
+    return "\n".join(texts)
 
 
 HEAD = '''"""Ranges of {about}, for {target}: 95 % of {draws} robots.
@@ -128,24 +127,16 @@ HEAD = '''"""Ranges of {about}, for {target}: 95 % of {draws} robots.
 Values are drawn one by one here. They are correlated: where that matters, load robots of the ensemble instead.
 """
 
-{imports}
+'''
+
+MJLAB = '''import re
+
+from mjlab.envs.mdp import dr
+from mjlab.managers.event_manager import EventTermCfg
+from mjlab.managers.scene_entity_config import SceneEntityCfg
 
 {tables}
 
-'''
-
-
-def _headed(table: dict[str, Any], about: str, target: str, imports: str, code: str) -> str:
-    head = HEAD.format(about=about, target=target, draws=DRAWS, imports=imports, tables=_tables(table))
-    return head + code.strip() + "\n"
-
-
-def _mjlab(table: dict[str, Any], about: str) -> str:
-    imports = (
-        "import re\n\nfrom mjlab.envs.mdp import dr\nfrom mjlab.managers.event_manager import EventTermCfg\n"
-        "from mjlab.managers.scene_entity_config import SceneEntityCfg"
-    )
-    code = '''
 def _event(function, ranges, entity):
     params = {"ranges": {re.escape(name): x for name, x in ranges.items()}, "operation": "abs"}
     return EventTermCfg(mode="startup", func=function, params={**params, "asset_cfg": SceneEntityCfg(entity)})
@@ -160,12 +151,14 @@ def events(entity="robot"):
         "identified_mass": _event(dr.body_mass, MASS, entity),
     }
 '''
-    return _headed(table, about, "mjlab", imports, code)
 
+ISAACLAB = '''import re
 
-def _isaaclab(table: dict[str, Any], about: str) -> str:
-    imports = "import re\n\nimport isaaclab.envs.mdp as mdp\nfrom isaaclab.managers import EventTermCfg, SceneEntityCfg"
-    code = '''
+import isaaclab.envs.mdp as mdp
+from isaaclab.managers import EventTermCfg, SceneEntityCfg
+
+{tables}
+
 def events(entity="robot"):
     """Return event terms, by name, for the events of an environment's configuration.
 
@@ -196,12 +189,12 @@ def events(entity="robot"):
         )
     return found
 '''
-    return _headed(table, about, "Isaac Lab", imports, code)
 
+PLAYGROUND = '''import jax
+import jax.numpy as jp
 
-def _playground(table: dict[str, Any], about: str) -> str:
-    imports = "import jax\nimport jax.numpy as jp"
-    code = '''
+{tables}
+
 def randomizer(mj_model):
     """Return what Playground takes as `randomization_fn`, for models that have these joints and bodies by their names."""
 
@@ -235,8 +228,10 @@ def randomizer(mj_model):
 
     return randomize
 '''
-    return _headed(table, about, "MuJoCo Playground", imports, code)
 
-
-CODE = {"_mjlab.py": _mjlab, "_isaaclab.py": _isaaclab, "_playground.py": _playground}
-"""Endings of the files of code, and what writes them."""
+CODE = {
+    "_mjlab.py": ("mjlab", MJLAB),
+    "_isaaclab.py": ("Isaac Lab", ISAACLAB),
+    "_playground.py": ("MuJoCo Playground", PLAYGROUND),
+}
+"""Endings of the files of code -> what they are for, and how they are written."""
