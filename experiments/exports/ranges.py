@@ -13,7 +13,9 @@ from idbench.experiments.reports.panels import Panel, stacked
 from idbench.identify import Array
 
 PICTURE = "_band.svg"  # Ending of the name of the picture of the band
-QUANTILES = (0.025, 0.5, 0.975)  # The middle of a value, and the ends of the range that holds 95 % of the robots
+QUANTILES = {"low": 0.025, "middle": 0.5, "high": 0.975}
+"""The middle of a value, and the ends of the range that holds 95 % of the robots."""
+
 DIGITS = 6  # Significant digits: draws scatter by far more
 
 JOINT = {"armature": "dof_armature", "damping": "dof_damping", "frictionloss": "dof_frictionloss"}
@@ -98,14 +100,8 @@ def ranges(ensemble: Ensemble) -> dict[str, Any]:
 
 
 def _told(x: Array) -> dict[str, float]:
-    low, middle, high = np.quantile(x, QUANTILES)
-    return {
-        "mean": _short(x.mean()),
-        "sigma": _short(x.std()),
-        "low": _short(low),
-        "middle": _short(middle),
-        "high": _short(high),
-    }
+    moments = {"mean": _short(x.mean()), "sigma": _short(x.std())}
+    return moments | {name: _short(np.quantile(x, share)) for name, share in QUANTILES.items()}
 
 
 def _short(x: Any) -> float:
