@@ -1,6 +1,6 @@
 """Robots drawn from what an identification leaves open, and whether their free runs hold a log that was not fitted."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -144,9 +144,7 @@ class Ensemble:
     @cached_property
     def bands(self) -> list[FreeRuns]:
         """The bands on the held-out logs; of a log that cannot be run there is none."""
-        return list(self._bands())
-
-    def _bands(self) -> Iterator[FreeRuns]:
+        bands = list[FreeRuns]()
         for name, log in (self.fit.logs.held_out or {}).items():
             rng = np.random.default_rng(self.seed + 2)
             held = on_log(self.fit, name, log)
@@ -161,7 +159,9 @@ class Ensemble:
             found[gone.all(axis=1)] = np.inf  # a run in which all diverge holds nothing
             low, high = np.nanquantile(found, tails, axis=1)
             ends = np.nanquantile(usual[:, :, -1], tails, axis=1)
-            yield FreeRuns(held.title, q, low, high, np.asarray((ends[1] - ends[0]).mean(axis=0)), float(gone.mean()))
+            usual_width = np.asarray((ends[1] - ends[0]).mean(axis=0))
+            bands.append(FreeRuns(held.title, q, low, high, usual_width, float(gone.mean())))
+        return bands
 
     def _drawn(self, draws: int, spread: float, rng: np.random.Generator) -> dict[str, Array]:
         """Return consistent robots about the estimate, `spread` times its standard errors away."""
