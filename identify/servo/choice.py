@@ -99,12 +99,11 @@ def choose_friction(
     clusters = PER_PARAMETER * max(len(fit.free) for fit in fits.values())
     parts = min(stretches(fit.found, fit.loop, clusters) for fit in fits.values())  # the same parts of the log for all laws
     costs = {law: left_out(fit.found, fit.loop, c, parts).costs for law, fit in fits.items()}
-    tests = len(fits) - 1
-    first = next(iter(fits))
+    first, *others = fits
     chosen, p = first, dict[str, float]()
-    for law in [law for law in fits if law != first]:
-        p[law] = p_value(costs[law], costs[first], tests)
-        if costs[law].mean() < costs[chosen].mean() and p_value(costs[law], costs[chosen], tests) < LEVEL:
+    for law in others:
+        p[law] = p_value(costs[law], costs[first], len(others))
+        if costs[law].mean() < costs[chosen].mean() and p_value(costs[law], costs[chosen], len(others)) < LEVEL:
             chosen = law
     return ServoFrictionChoice(fits, chosen, {law: float(np.sqrt(x.mean())) for law, x in costs.items()}, p)
 
