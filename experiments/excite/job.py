@@ -8,6 +8,7 @@ from idbench.experiments.errors import ExperimentError
 from idbench.experiments.excite.design import Design
 from idbench.experiments.excite.excited import Excited
 from idbench.experiments.excite.sequence import MotionSequence
+from idbench.experiments.identification.known import number_of
 from idbench.experiments.identification.reading import ReadOptions, file_of, read
 from idbench.experiments.identification.robot_model import RobotModel, absolute
 from idbench.experiments.requests.jobs import ExciteRequest
@@ -125,10 +126,7 @@ def _weights(given: tuple[str, ...]) -> Mapping[str, float]:
         name, _, value = text.partition("=")
         if name in found:
             raise ExperimentError(f"--weigh gives {name} twice")
-        try:
-            found[name] = float(value)
-        except ValueError:
-            found[name] = -1.0
+        found[name] = number_of(value) or 0.0
         if not 1e-6 <= found[name] <= 1e6:
             raise ExperimentError(f"--weigh {text}: give a parameter and a weight from 1e-6 to 1e6, such as LMY2=4")
     return found
@@ -138,10 +136,7 @@ def _percent(text: str | None) -> float | None:
     """Return a share given in percent."""
     if text is None:
         return None
-    try:
-        share = float(text.removesuffix("%")) / 100
-    except ValueError:
-        share = -1.0
+    share = (number_of(text.removesuffix("%")) or 0.0) / 100
     if not 0 < share < 1:
         raise ExperimentError(f"--until {text}: give a share between 0 and 100 %, such as 0.1%")
     return share

@@ -41,7 +41,7 @@ class Known:
         groups, values = list[str](), dict[str, float | None]()
         for word in words:
             name, equals, stated = word.partition("=")
-            value = _number(stated)
+            value = number_of(stated)
             if not (name and equals) or (value is None and stated != FILE):
                 raise ExperimentError(f"--hold {word}: write NAME=VALUE, NAME=file, or {', '.join(f'{k}=file' for k in KINDS)}")
             if name in values or name in groups:
@@ -117,13 +117,13 @@ class RoughlyKnown:
         for word in words:
             name, equals, stated = word.partition("=")
             first, _, trust = (stated if equals else word).partition(":")
-            sigma, relative = _number(trust.removesuffix("%")), trust.endswith("%")
+            sigma, relative = number_of(trust.removesuffix("%")), trust.endswith("%")
             sigma = sigma / 100 if sigma is not None and relative else sigma
             wrong = bool(trust) and not (sigma is not None and sigma > 0)
             if not equals and first == FILE and not wrong and not links:
                 links, share = True, sigma
                 continue
-            value = _number(first)
+            value = number_of(first)
             if not equals or not name or wrong or sigma is None or (value is None and first != FILE) or name in values:
                 raise ExperimentError(
                     f"--prior {word}: write file, file:25% (links near the robot's file), NAME=VALUE:30%, NAME=VALUE:SIGMA or "
@@ -191,7 +191,8 @@ def _grouped(grouping: BaseParameters, names: Sequence[str]) -> str:
     return f"no base parameter is made of {', '.join(names)} alone ({'; '.join(made[:3]) or 'they move nothing'})"
 
 
-def _number(text: str) -> float | None:
+def number_of(text: str) -> float | None:
+    """Finite number that a text states; None if it states none."""
     try:
         value = float(text)
     except ValueError:
