@@ -148,7 +148,6 @@ def _comment(text: str) -> str:
 
 
 def _number(x: float) -> str:
-    text = repr(float(x))
     if not isfinite(x):
         return "NAN" if isnan(x) else "INFINITY" if x > 0 else "(-INFINITY)"
-    return text if any(mark in text for mark in ".e") else f"{text}.0"
+    return repr(float(x))
