@@ -136,6 +136,34 @@ class AbstractBlock(ABC):
         return {}
 
 
+class AbstractColumns(AbstractBlock):
+    """A block that finds its columns in the same way whichever function asks for them."""
+
+    @abstractmethod
+    def columns(self, function: str, state: State) -> BlockColumns:
+        """Return the columns of a function of this name: explicit, momentum, remainder or energy."""
+
+    @final
+    def explicit(self, state: State) -> BlockColumns:
+        """Return D (Eq. 5, 6)."""
+        return self.columns("explicit", state)
+
+    @final
+    def momentum(self, state: State) -> BlockColumns:
+        """Return M_i(q) qd (Eq. 9)."""
+        return self.columns("momentum", state)
+
+    @final
+    def remainder(self, state: State) -> BlockColumns:
+        """Return R_i(q, qd) (Eq. 8, 9)."""
+        return self.columns("remainder", state)
+
+    @final
+    def energy(self, state: State) -> BlockColumns:
+        """Return h_i(q, qd) (Eq. 10)."""
+        return self.columns("energy", state)
+
+
 @runtime_checkable
 class Narrowing(Protocol):
     """A block that can spare itself the columns that nobody asks for."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from idbench.identify.arrays import Array, combined
 from idbench.identify.basis.basis import Basis
-from idbench.identify.basis.block import AbstractConservativeBlock, BlockColumns, Kind, Parameter
+from idbench.identify.basis.block import AbstractColumns, AbstractConservativeBlock, BlockColumns, Kind, Parameter
 from idbench.identify.basis.joint_law import AbstractJointLaw
 from idbench.identify.basis.tree_links import TreeLinks
 from idbench.identify.data.kinematics import KinematicTree
@@ -61,7 +61,7 @@ HELD_SHARE = "payload"  # Condition of a log: the share of the payload that is h
 
 
 @dataclass(frozen=True, eq=False)
-class PayloadLink(AbstractConservativeBlock):
+class PayloadLink(AbstractColumns, AbstractConservativeBlock):
     """A payload on a link, XXL XYL XZL YYL YZL ZZL MXL MYL MZL ML in the frame of the link, in the logs that have it.
 
     W. Khalil, M. Gautier and P. Lemoine, "Identification of the payload inertial parameters of industrial manipulators", IEEE
@@ -86,27 +86,14 @@ class PayloadLink(AbstractConservativeBlock):
         """Return this block without the work for other parameters."""
         return replace(self, only=frozenset(parameters))
 
-    def explicit(self, state: State) -> BlockColumns:
-        """Return D of the payload (Eq. 5, 6)."""
-        return self._held(state, self._links.explicit(state))
-
-    def momentum(self, state: State) -> BlockColumns:
-        """Return its momenta (Eq. 9)."""
-        return self._held(state, self._links.momentum(state))
-
-    def remainder(self, state: State) -> BlockColumns:
-        """Return its torques that are no derivative of a momentum (Eq. 8, 9)."""
-        return self._held(state, self._links.remainder(state))
-
-    def energy(self, state: State) -> BlockColumns:
-        """Return its energy (Eq. 10)."""
-        return self._held(state, self._links.energy(state))
-
-    def _held(self, state: State, columns: BlockColumns) -> BlockColumns:
+    def columns(self, function: str, state: State) -> BlockColumns:
+        """Return those of the link, in the share of the payload that is held."""
         share = state.condition(HELD_SHARE)[..., 0, :]
         if not np.any(share):
             return {}
-        return {(row, _own(parameter)): share * column for (row, parameter), column in columns.items()}
+        return {
+            (row, _own(parameter)): share * column for (row, parameter), column in self._links.columns(function, state).items()
+        }
 
     @cached_property
     def _links(self) -> TreeLinks:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 
 from idbench.identify.arrays import Array
-from idbench.identify.basis.block import AbstractBlock, BlockColumns, Parameter
+from idbench.identify.basis.block import AbstractBlock, AbstractColumns, BlockColumns, Parameter
 from idbench.identify.data.kinematics import Coupling
 from idbench.identify.signals.signals import State
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class OfJoints(AbstractBlock):
+class OfJoints(AbstractColumns):
     """A block, the parameters of some joints of it alone: friction that differs from joint to joint."""
 
     block: AbstractBlock
@@ -28,25 +28,14 @@ class OfJoints(AbstractBlock):
         """Return those of the joints."""
         return tuple(p for p in self.block.parameters(n) if p.joint in self.joints)
 
-    def explicit(self, state: State) -> BlockColumns:
-        """Return the columns of the joint torques."""
-        return self._of(self.block.explicit(state))
-
-    def momentum(self, state: State) -> BlockColumns:
-        """Return the columns of the momenta."""
-        return self._of(self.block.momentum(state))
-
-    def remainder(self, state: State) -> BlockColumns:
-        """Return the columns of the torques that are no derivative of a momentum."""
-        return self._of(self.block.remainder(state))
-
-    def energy(self, state: State) -> BlockColumns:
-        """Return the columns of the energy."""
-        return self._of(self.block.energy(state))
+    def columns(self, function: str, state: State) -> BlockColumns:
+        """Return the block's columns of the joints' parameters."""
+        columns: BlockColumns = getattr(self.block, function)(state)
+        return {address: column for address, column in columns.items() if address[1].joint in self.joints}
 
     def dissipation(self, state: State) -> BlockColumns:
         """Return the columns of the dissipated power."""
-        return self._of(self.block.dissipation(state))
+        return self.columns("dissipation", state)
 
     @property
     def is_nonlinear(self) -> bool:
@@ -63,9 +52,6 @@ class OfJoints(AbstractBlock):
             parameter: value for parameter, value in self.block.operating_point(n).items() if parameter.joint in self.joints
         }
 
-    def _of(self, columns: BlockColumns) -> BlockColumns:
-        return {address: column for address, column in columns.items() if address[1].joint in self.joints}
-
 
 def block_of_all_joints(block: AbstractBlock) -> AbstractBlock:
     """Return a block as it is of all joints."""
@@ -73,7 +59,7 @@ def block_of_all_joints(block: AbstractBlock) -> AbstractBlock:
 
 
 @dataclass(frozen=True, eq=False)
-class Coupled(AbstractBlock):
+class Coupled(AbstractColumns):
     """What a drive adds whose motor turns with several joints, theta = weights' q: its rotor, its frictions, a spring.
 
     A torque of the motor acts on each of the joints with the joint's weight, the dual of how positions add up: the columns are
@@ -89,25 +75,17 @@ class Coupled(AbstractBlock):
         """Return those of the block, of the drive instead of a joint."""
         return tuple(map(self._own, self.block.parameters(1)))
 
-    def explicit(self, state: State) -> BlockColumns:
-        """Return the columns of the joint torques."""
-        return self._of_joints(self.block.explicit(self._motor(state)))
-
-    def momentum(self, state: State) -> BlockColumns:
-        """Return the columns of the momenta."""
-        return self._of_joints(self.block.momentum(self._motor(state)))
-
-    def remainder(self, state: State) -> BlockColumns:
-        """Return the columns of the torques that are no derivative of a momentum."""
-        return self._of_joints(self.block.remainder(self._motor(state)))
-
-    def energy(self, state: State) -> BlockColumns:
-        """Return the columns of the energy."""
-        return {(row, self._own(p)): x for (row, p), x in self.block.energy(self._motor(state)).items()}
+    def columns(self, function: str, state: State) -> BlockColumns:
+        """Return the motor's energy and power as they are, its torques and momenta in the row of each joint that it turns."""
+        columns: BlockColumns = getattr(self.block, function)(self._motor(state))
+        if function in ("energy", "dissipation"):
+            return {(row, self._own(p)): x for (row, p), x in columns.items()}
+        weights = self.coupling.weights
+        return {(j, self._own(p)): weights[j] * x for (_, p), x in columns.items() for j in np.flatnonzero(weights).tolist()}
 
     def dissipation(self, state: State) -> BlockColumns:
         """Return the columns of the dissipated power."""
-        return {(row, self._own(p)): x for (row, p), x in self.block.dissipation(self._motor(state)).items()}
+        return self.columns("dissipation", state)
 
     def _motor(self, state: State) -> State:
         """Return the motion of the motor."""
@@ -116,14 +94,6 @@ class Coupled(AbstractBlock):
             return np.sum(np.asarray(self.coupling.weights)[:, None] * x, axis=-2, keepdims=True)
 
         return State(along(state.q), along(state.qd), lambda _: along(state.qdd))
-
-    def _of_joints(self, columns: BlockColumns) -> BlockColumns:
-        found = {}
-        for (_, parameter), column in columns.items():
-            for j, weight in enumerate(self.coupling.weights):
-                if weight:
-                    found[j, self._own(parameter)] = weight * column
-        return found
 
     def _own(self, parameter: Parameter) -> Parameter:
         return replace(parameter, joint=None, drive=self.coupling.name)

@@ -8,7 +8,14 @@ from typing import Any, NamedTuple, Self, TypeAlias
 import numpy as np
 
 from idbench.identify.basis.basis import Basis
-from idbench.identify.basis.block import AbstractBlock, AbstractConservativeBlock, BlockColumns, Kind, Parameter
+from idbench.identify.basis.block import (
+    AbstractBlock,
+    AbstractColumns,
+    AbstractConservativeBlock,
+    BlockColumns,
+    Kind,
+    Parameter,
+)
 from idbench.identify.basis.friction.laws import CoulombFriction, ViscousFriction
 from idbench.identify.basis.friction.load import TiedFriction
 from idbench.identify.basis.joint_law import AbstractFriction, Armature
@@ -124,7 +131,7 @@ def energy(V: Twist, up: Vector, height: Term) -> tuple[Term, ...]:
 
 
 @dataclass(frozen=True)
-class TreeLinks(AbstractConservativeBlock):
+class TreeLinks(AbstractColumns, AbstractConservativeBlock):
     """Rigid links of a tree, ten parameters each: XX1 XY1 XZ1 YY1 YZ1 ZZ1 MX1 MY1 MZ1 M1, XX2, ...
 
     The inertia matrix and the first moments are about the origin of the link's frame, in its axes. By Newton and Euler, and by
@@ -142,33 +149,13 @@ class TreeLinks(AbstractConservativeBlock):
         """Return ten parameters for each link that has mass; raise SettingError unless the tree has `n` joints."""
         if n != self.tree.n:
             raise SettingError(f"robot {self.tree.name!r} has {self.tree.n} joints, not {n}")
-        return tuple(parameter for j in self._massive for parameter in parameters_of_link(j))
+        return tuple(parameter for j in _massive(self.tree) for parameter in parameters_of_link(j))
 
     def narrowed(self, parameters: Set[Parameter]) -> Self:
         """Return this block without the work for other parameters."""
         return replace(self, only=frozenset(parameters))
 
-    def explicit(self, state: State) -> BlockColumns:
-        """Return D (Eq. 5, 6)."""
-        return self._columns("explicit", state)
-
-    def momentum(self, state: State) -> BlockColumns:
-        """Return M_i(q) qd (Eq. 9)."""
-        return self._columns("momentum", state)
-
-    def remainder(self, state: State) -> BlockColumns:
-        """Return R_i(q, qd) = -dT_i/dq + dU_i/dq (Eq. 8, 9)."""
-        return self._columns("remainder", state)
-
-    def energy(self, state: State) -> BlockColumns:
-        """Return h_i(q, qd) (Eq. 10)."""
-        return self._columns("energy", state)
-
-    @property
-    def _massive(self) -> tuple[int, ...]:
-        return _massive(self.tree)
-
-    def _columns(self, function: str, state: State) -> BlockColumns:
+    def columns(self, function: str, state: State) -> BlockColumns:
         """Return the columns that are asked for and not zero at all times."""
         if isinstance(state.q, np.ndarray):
             return _replay(self.tree, self.only, function).of(state)
