@@ -2,10 +2,10 @@
 
 from collections import Counter
 from dataclasses import dataclass
-from typing import Any
 
 from idbench.identify.basis.basis import Basis
 from idbench.identify.basis.loads import HELD_SHARE
+from idbench.identify.basis.replay import motion_of_symbols
 from idbench.identify.basis.symbols import flat, inputs
 from idbench.identify.basis.tape import Symbol, Tape, Value
 from idbench.identify.signals.signals import State
@@ -75,10 +75,8 @@ _COUNTED = {"+": "additions", "-": "additions", "*": "multiplications", **dict.f
 def recorded_state(tape: Tape, n: int) -> State:
     """Return a motion of symbols: inputs q, qd, qdd, temperature and payload."""
     q, qd, qdd = (inputs(tape, name, n) for name in ("q", "qd", "qdd"))
-    conditions: Any = {"temperature": inputs(tape, "temperature", n), HELD_SHARE: inputs(tape, HELD_SHARE, 1)}
-    made: Any = State  # symbols for arrays
-    state: State = made(q, qd, lambda _: qdd, conditions)
-    return state
+    conditions = {"temperature": inputs(tape, "temperature", n), HELD_SHARE: inputs(tape, HELD_SHARE, 1)}
+    return motion_of_symbols(q, qd, qdd, conditions=conditions)
 
 
 def _columns(basis: Basis, state: State, what: str) -> list[Value]:

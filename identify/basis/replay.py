@@ -1,6 +1,7 @@
 """Columns of links as a list of operations: found once on symbols, done in pieces of the motion that stay in the cache."""
 
-from collections.abc import Hashable, Mapping
+from collections.abc import Callable, Hashable, Mapping
+from functools import partial
 from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
@@ -16,49 +17,36 @@ PIECE = 8192
 a long log at once twice as long."""
 
 
-class RecordedSignal:
-    """A signal (..., joint, time) that stands in for numbers while columns are recorded.
+class SignalOfSymbols:
+    """A signal (..., joint, time) that stands in for numbers: a single value of each joint, many times faster than arrays.
 
     Parameters
     ----------
-    tape : Tape
-        That records.
-    name : str
-        Field of a `State`.
+    of : callable
+        Joint -> its value.
     """
 
-    def __init__(self, tape: Tape, name: str) -> None:
-        self._tape, self._name = tape, name
+    def __init__(self, of: Callable[[int], Value]) -> None:
+        self._of = of
 
-    def __getitem__(self, place: tuple[Any, ...]) -> Symbol:
-        return self._tape.input(self._name, place[-2])
+    def __getitem__(self, place: tuple[Any, ...]) -> Value:
+        return self._of(place[-2])
 
 
 def recorded_motion(tape: Tape) -> State:
     """Return a motion of symbols, one for each joint's position, velocity and acceleration."""
-    made: Any = State  # symbols for arrays
-    state: State = made(RecordedSignal(tape, "q"), RecordedSignal(tape, "qd"), lambda _: RecordedSignal(tape, "qdd"))
-    return state
-
-
-class _Instant:
-    """Values of symbols, shape (joint, 1), that are taken one by one: many times faster than arrays of one."""
-
-    def __init__(self, values: Any) -> None:
-        self._values = values
-
-    def __getitem__(self, place: tuple[Any, ...]) -> Value:
-        value: Value = self._values[place[-2], 0]
-        return value
+    return motion_of_symbols(*(SignalOfSymbols(partial(tape.input, name)) for name in ("q", "qd", "qdd")))
 
 
 def at_one_instant(state: State) -> State:
     """Return a motion of symbols, signals of shape (joint, 1), as one whose signals are single values."""
-    given: Any = state
-    made: Any = State
-    q, qd, qdd = (_Instant(x.values) for x in (given.q, given.qd, given.qdd))
-    single: State = made(q, qd, lambda _: qdd)
-    return single
+    signals: tuple[Any, ...] = state.q, state.qd, state.qdd
+    return motion_of_symbols(*(SignalOfSymbols(x.values[:, 0].item) for x in signals))
+
+
+def motion_of_symbols(q: Any, qd: Any, qdd: Any, *, conditions: Mapping[str, Any] | None = None) -> State:
+    """Return a motion whose signals are of symbols, not arrays of numbers."""
+    return State(q, qd, lambda _: qdd, conditions or {})
 
 
 class _Step(NamedTuple):
