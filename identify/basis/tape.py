@@ -53,7 +53,7 @@ Step: TypeAlias = tuple[Any, ...]
 
 
 class Symbol:
-    """The value of a step, one object a step."""
+    """The value of a step, one object a step: it equals itself alone, and no number."""
 
     __slots__ = ("number", "tape")
 
@@ -63,8 +63,7 @@ class Symbol:
     def __add__(self, other: "Value") -> "Value":
         return self.tape.apply("+", self, other)
 
-    def __radd__(self, other: float) -> "Value":
-        return self.tape.apply("+", other, self)
+    __radd__ = __add__
 
     def __sub__(self, other: "Value") -> "Value":
         return self.tape.apply("-", self, other)
@@ -75,8 +74,7 @@ class Symbol:
     def __mul__(self, other: "Value") -> "Value":
         return self.tape.apply("*", self, other)
 
-    def __rmul__(self, other: float) -> "Value":
-        return self.tape.apply("*", other, self)
+    __rmul__ = __mul__
 
     def __neg__(self) -> "Value":
         return self.tape.apply("negate", self)
@@ -143,13 +141,9 @@ class Tape:
         return self.symbols[of[0]] if operation == "negate" else None
 
 
-def _is(x: Value, value: float) -> bool:
-    return x == value  # a symbol equals itself alone
-
-
 def _sum(tape: Tape, a: Value, b: Value) -> Value | None:
-    if _is(a, 0.0) or _is(b, 0.0):
-        return b if _is(a, 0.0) else a
+    if a == 0.0 or b == 0.0:
+        return b if a == 0.0 else a
     if isinstance(b, Symbol) and (less := tape.negated(b)) is not None:
         return tape.apply("-", a, less)
     if isinstance(a, Symbol) and (less := tape.negated(a)) is not None:
@@ -158,9 +152,9 @@ def _sum(tape: Tape, a: Value, b: Value) -> Value | None:
 
 
 def _difference(tape: Tape, a: Value, b: Value) -> Value | None:
-    if _is(b, 0.0) or a == b:
-        return a if _is(b, 0.0) else 0.0
-    if _is(a, 0.0):
+    if b in (0.0, a):
+        return a if b == 0.0 else 0.0
+    if a == 0.0:
         return tape.apply("negate", b)
     if isinstance(b, Symbol) and (more := tape.negated(b)) is not None:
         return tape.apply("+", a, more)
@@ -169,9 +163,9 @@ def _difference(tape: Tape, a: Value, b: Value) -> Value | None:
 
 def _product(tape: Tape, a: Value, b: Value) -> Value | None:
     a, b = (b, a) if isinstance(a, Symbol) and not isinstance(b, Symbol) else (a, b)
-    if _is(a, 0.0) or _is(a, 1.0):
+    if a in (0.0, 1.0):
         return b if a else 0.0
-    if _is(a, -1.0):
+    if a == -1.0:
         return tape.apply("negate", b)
     if not isinstance(a, Symbol) and isinstance(b, Symbol):
         operation, *of = tape.steps[b.number]
@@ -185,7 +179,7 @@ def _product(tape: Tape, a: Value, b: Value) -> Value | None:
 
 
 def _quotient(tape: Tape, a: Value, b: Value) -> Value | None:
-    if _is(a, 0.0):
+    if a == 0.0:
         return 0.0
     return None if isinstance(b, Symbol) or b == 0.0 else tape.apply("*", a, 1.0 / b)
 
@@ -195,10 +189,6 @@ def _power(tape: Tape, a: Value, b: Value) -> Value | None:
         return tape.apply("sqrt", a) if b == 0.5 else None
     half = tape.apply("**", a, b // 2) if b > 1 else 1.0
     return tape.apply("*", tape.apply("*", half, half), a) if b % 2 else tape.apply("*", half, half)
-
-
-def _negation(tape: Tape, a: Value) -> Value | None:
-    return tape.negated(a)
 
 
 def _choice(_: Tape, condition: Value, a: Value, b: Value) -> Value | None:
@@ -211,6 +201,6 @@ _RULES: dict[str, Callable[..., Value | None]] = {
     "*": _product,
     "/": _quotient,
     "**": _power,
-    "negate": _negation,
+    "negate": Tape.negated,
     "where": _choice,
 }
