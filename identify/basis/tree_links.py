@@ -1,9 +1,9 @@
 """The links of any tree of hinges and slides."""
 
-from collections.abc import Callable, Iterator, Mapping, Set
+from collections.abc import Iterator, Mapping, Set
 from dataclasses import dataclass, replace
 from functools import cache, lru_cache
-from typing import Any, NamedTuple, Self, TypeAlias
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -191,35 +191,18 @@ def _formulas(tree: KinematicTree, function: str, state: State) -> dict[tuple[in
     if function == "energy":
         stored = {j: energy(at.velocity[j], at.up[j], at.height[j]) for j in massive}
         return {(0, p): x for j in massive for p, x in zip(parameters_of_link(j), stored[j], strict=True)}
-    column = _COLUMN_OF[function](at, massive)
+    if function == "explicit":
+        wrench = {j: Wrench.inertial(at.velocity[j], at.acceleration[j], at.up[j]) for j in massive}
+    else:
+        wrench = {j: Wrench.momentum(at.velocity[j]) for j in massive}
+    weight = {j: Wrench.weight(at.up[j]) for j in massive} if function == "remainder" else {}
+
+    def column(i: int, j: int, x: int) -> Term:
+        if function == "remainder":
+            return minus(weight[j].along(at.unit[j][i], x), wrench[j].along(at.slope[j][i], x))
+        return wrench[j].along(at.unit[j][i], x)
+
     return {(i, p): column(i, j, x) for j in massive for i in tree.ancestors(j) for x, p in enumerate(parameters_of_link(j))}
-
-
-Column: TypeAlias = Callable[[int, int, int], Term]
-"""(joint, link that it moves, parameter) -> its column."""
-
-
-def _explicit(at: Twists, massive: tuple[int, ...]) -> Column:
-    force = {j: Wrench.inertial(at.velocity[j], at.acceleration[j], at.up[j]) for j in massive}
-    return lambda i, j, x: force[j].along(at.unit[j][i], x)
-
-
-def _momentum(at: Twists, massive: tuple[int, ...]) -> Column:
-    momentum = {j: Wrench.momentum(at.velocity[j]) for j in massive}
-    return lambda i, j, x: momentum[j].along(at.unit[j][i], x)
-
-
-def _remainder(at: Twists, massive: tuple[int, ...]) -> Column:
-    momentum = {j: Wrench.momentum(at.velocity[j]) for j in massive}
-    weight = {j: Wrench.weight(at.up[j]) for j in massive}
-    return lambda i, j, x: minus(weight[j].along(at.unit[j][i], x), momentum[j].along(at.slope[j][i], x))
-
-
-_COLUMN_OF: dict[str, Callable[[Twists, tuple[int, ...]], Column]] = {
-    "explicit": _explicit,
-    "momentum": _momentum,
-    "remainder": _remainder,
-}
 
 
 @cache
