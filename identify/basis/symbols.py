@@ -1,6 +1,8 @@
 """Arrays of symbols, for code that is written for arrays of numbers."""
 
 from collections.abc import Callable
+from functools import reduce
+from operator import sub
 from typing import Any
 
 import numpy as np
@@ -138,19 +140,13 @@ def solved(M: list[Values], b: Values) -> Values:
     D: Values = []
     for j in range(n):
         below = [L[j][k] * D[k] for k in range(j)]
-        D.append(_less(M[j][j], [L[j][k] * below[k] for k in range(j)]))
+        D.append(reduce(sub, [L[j][k] * below[k] for k in range(j)], M[j][j]))
         for i in range(j + 1, n):
-            L[i][j] = _less(M[i][j], [L[i][k] * below[k] for k in range(j)]) / D[j]
+            L[i][j] = reduce(sub, [L[i][k] * below[k] for k in range(j)], M[i][j]) / D[j]
     y: Values = []
     for i in range(n):
-        y.append(_less(b[i], [L[i][k] * y[k] for k in range(i)]))
+        y.append(reduce(sub, [L[i][k] * y[k] for k in range(i)], b[i]))
     x: Values = [0.0] * n
     for i in reversed(range(n)):
-        x[i] = _less(y[i] / D[i], [L[k][i] * x[k] for k in range(i + 1, n)])
+        x[i] = reduce(sub, [L[k][i] * x[k] for k in range(i + 1, n)], y[i] / D[i])
     return x
-
-
-def _less(total: Any, parts: Values) -> Any:
-    for part in parts:
-        total = total - part
-    return total
