@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Set
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -27,15 +27,12 @@ class DriveGains(AbstractJointLaw):
     of joint drive gains and dynamic parameters of robots", J. Dynamic Systems, Measurement, and Control 136 (2014) 051025.
     """
 
+    is_nonlinear: ClassVar[bool] = True
+
     model: Basis | None = None
     """The robot without the gains."""
     X: Array | None = None
     """Its parameters, as estimated before, shape (..., p)."""
-
-    @property
-    def is_nonlinear(self) -> bool:
-        """True."""
-        return True
 
     def letters(self) -> Mapping[str, tuple[Kind, str]]:
         """Return kg."""

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -231,15 +231,13 @@ def _best(rows: AdaptiveRows, basis: Basis, shaped: ShapedFriction, joints: Sequ
 class Candidates(AbstractJointLaw):
     """One law with several settings, a parameter each: to see which of them explains most."""
 
+    is_nonlinear: ClassVar[bool] = True
+    """It stands for what is yet to be found."""
+
     law: AbstractFriction
     """The law."""
     grid: tuple[Mapping[str, Any], ...]
     """Values of its settings."""
-
-    @property
-    def is_nonlinear(self) -> bool:
-        """True: it stands for what is yet to be found."""
-        return True
 
     def letters(self) -> Mapping[str, tuple[Kind, str]]:
         """Return a name for each of the settings."""

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -61,6 +61,8 @@ class LoadFriction(AbstractJointLaw):
     depending on load and velocity", IROS 2010. As long as there is none, it is that of a unit inertia.
     """
 
+    is_nonlinear: ClassVar[bool] = True
+
     bodies: Basis | None = None
     """The rigid bodies and rotors."""
     X: Array | None = None
@@ -79,11 +81,6 @@ class LoadFriction(AbstractJointLaw):
         if self.bodies is None or self.X is None:
             return state.qdd
         return combined(state.latest(self.bodies, self.bodies.explicit), self.X, np.zeros(state.q.shape))
-
-    @property
-    def is_nonlinear(self) -> bool:
-        """True."""
-        return True
 
     def adapted(self, basis: Basis, X: Array) -> Self:
         """Return the law with the load of an estimate."""

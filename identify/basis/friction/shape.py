@@ -48,6 +48,8 @@ class ShapedFriction(AbstractJointLaw):
     F0 and b0 are the estimate itself, these are the slopes of the residual, and sigma is that of nonlinear least squares.
     """
 
+    is_nonlinear: ClassVar[bool] = True
+
     law: AbstractFriction
     """The law; its settings of the shapes take arrays."""
     shapes: tuple[Shape, ...]
@@ -77,11 +79,6 @@ class ShapedFriction(AbstractJointLaw):
         """Return b0."""
         at, found = self.at_joints(n), {s.letters: s.setting for s in self.shapes}
         return {p: at[found[p.symbol]][..., p.joint] for p in self.parameters(n) if p.symbol in found}
-
-    @property
-    def is_nonlinear(self) -> bool:
-        """True."""
-        return True
 
     def adapted(self, basis: Basis, X: Array) -> Self:
         """Return the law, linear about an estimate."""
