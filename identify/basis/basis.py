@@ -9,7 +9,7 @@ from typing import Self
 import numpy as np
 
 from idbench.identify.arrays import HELD, Array, Columns
-from idbench.identify.basis.block import AbstractBlock, Kind, Narrowing, Parameter
+from idbench.identify.basis.block import AbstractBlock, Kind, Parameter
 from idbench.identify.blame import expect
 from idbench.identify.errors import PluginError, SettingError
 from idbench.identify.signals.signals import State
@@ -84,7 +84,7 @@ class Basis:
     def of(self, parameters: Sequence[Parameter]) -> Self:
         """Return the basis with these parameters alone, in this order; blocks are spared the work for others."""
         asked = {*parameters, *self.held, *(p for p, other in self.tied.items() if other in parameters)}
-        blocks = (block.narrowed(asked) if isinstance(block, Narrowing) else block for block in self.blocks)
+        blocks = (block.narrowed(asked) for block in self.blocks)
         there = tuple(block for block in blocks if asked.intersection(block.parameters(self.n)))
         return replace(self, blocks=there, kept=tuple(parameters))
 

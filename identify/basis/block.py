@@ -3,7 +3,7 @@
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Set
 from dataclasses import dataclass, field, replace
-from typing import Any, Literal, Protocol, Self, TypeAlias, final, runtime_checkable
+from typing import Any, Literal, Self, TypeAlias, final
 
 from idbench.identify.arrays import Array
 from idbench.identify.signals.signals import State
@@ -122,6 +122,10 @@ class AbstractBlock(ABC):
         """Return the columns of the dissipated power qd' Gamma_f in row 0 (Eq. 10); none by default."""
         return {}
 
+    def narrowed(self, parameters: Set[Parameter]) -> "AbstractBlock":
+        """Return the block without the work for other parameters, whose columns nobody asks for; itself by default."""
+        return self
+
     @property
     def is_nonlinear(self) -> bool:
         """Whether columns depend on parameters, so that the block holds about an estimate alone: see `adapted`."""
@@ -162,14 +166,6 @@ class AbstractColumns(AbstractBlock):
     def energy(self, state: State) -> BlockColumns:
         """Return h_i(q, qd) (Eq. 10)."""
         return self.columns("energy", state)
-
-
-@runtime_checkable
-class Narrowing(Protocol):
-    """A block that can spare itself the columns that nobody asks for."""
-
-    def narrowed(self, parameters: Set[Parameter]) -> AbstractBlock:
-        """Return the block without the work for other parameters."""
 
 
 class AbstractConservativeBlock(AbstractBlock):
