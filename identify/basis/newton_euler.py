@@ -9,7 +9,7 @@ from idbench.identify.arrays import Array
 from idbench.identify.basis.basis import Basis
 from idbench.identify.basis.block import AbstractBlock, BlockColumns, Parameter
 from idbench.identify.basis.tree_links import KINDS, MX, M, TreeLinks, Wrench, parameters_of_link
-from idbench.identify.basis.twists import Term, Twists, Vector, add, cross, dot, is_zero, scaled
+from idbench.identify.basis.twists import Term, Twists, Vector, add, apply, cross, dot, is_zero, plus, scaled
 from idbench.identify.data.kinematics import GROUND, KinematicTree
 from idbench.identify.signals.signals import State
 
@@ -45,7 +45,7 @@ def link_torques(tree: KinematicTree, state: State, values: Mapping[Parameter, T
             continue
         force, moment = (add(*parts) for parts in zip(*waiting[j], strict=True))
         place, parent = at.placements[j], tree.joints[j].parent
-        torques[j] = _power(place.S.v, place.S.w, force, moment)
+        torques[j] = plus(dot(place.S.v, force), dot(place.S.w, moment))
         if parent != GROUND:
             out = place.outward(force)
             waiting[parent].append((out, add(place.outward(moment), cross(place.position, out))))
@@ -111,14 +111,9 @@ def _values(basis: Basis, block: TreeLinks, X: Array) -> dict[Parameter, Term]:
     return found
 
 
-def _power(v: Vector, w: Vector, force: Vector, moment: Vector) -> Term:
-    linear, angular = dot(v, force), dot(w, moment)
-    return angular if is_zero(linear) else linear if is_zero(angular) else linear + angular
-
-
 def _inertial(wrench: Wrench, own: list[Term]) -> tuple[Vector, Vector]:
     """Return force and moment that move a link: M a + A MS, and J (XX ... ZZ) + MS x a."""
     first = Vector(*own[MX : MX + 3])
-    force = add(scaled(own[M], wrench.a), Vector(*(dot(row, first) for row in wrench.A)))
+    force = add(scaled(own[M], wrench.a), apply(wrench.A, first))
     turning = add(*(scaled(x, column) for x, column in zip(own[: len(KINDS) - 4], wrench.J, strict=True)))
     return force, add(turning, cross(first, wrench.a))

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Hashable, Mapping
 from functools import partial
-from typing import Any, Generic, NamedTuple, TypeVar
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 
@@ -49,14 +49,6 @@ def motion_of_symbols(q: Any, qd: Any, qdd: Any, *, conditions: Mapping[str, Any
     return State(q, qd, lambda _: qdd, conditions or {})
 
 
-class _Step(NamedTuple):
-    """An operation on values, by their places."""
-
-    function: Any
-    given: list[int]
-    result: int
-
-
 class Program(Generic[Key]):
     """Values of a tape as functions of a motion.
 
@@ -95,7 +87,7 @@ class Program(Generic[Key]):
             steps.append((NUMBERS[operation], given, places[number]))
         self._constants, first = list(constants), kept + self._scratch
         self._steps = [
-            _Step(function, [first + constants[x] if isinstance(x, float) else x for x in given], at)
+            (function, [first + constants[x] if isinstance(x, float) else x for x in given], at)
             for function, given, at in steps
         ]
 

@@ -46,11 +46,11 @@ from idbench.identify.signals.signals import State
 
 MX, M = INERTIAL.index("MX"), INERTIAL.index("M")
 
-_UNITS: dict[Kind, str] = {"inertia": "kg m^2", "first moment": "kg m", "mass": "kg"}
-
-_OF_LETTERS: tuple[Kind, ...] = ("inertia",) * 6 + ("first moment",) * 3 + ("mass",)
-
-KINDS: dict[str, tuple[Kind, str]] = {x: (kind, _UNITS[kind]) for x, kind in zip(INERTIAL, _OF_LETTERS, strict=True)}
+KINDS: dict[str, tuple[Kind, str]] = {
+    **dict.fromkeys(INERTIAL[:MX], ("inertia", "kg m^2")),
+    **dict.fromkeys(INERTIAL[MX:M], ("first moment", "kg m")),
+    "M": ("mass", "kg"),
+}
 """What the inertial parameters measure, and their units."""
 
 NOTHING: Matrix = (ZERO, ZERO, ZERO)
@@ -93,7 +93,15 @@ class Wrench(NamedTuple):
         w = V.w
         minus_w = scaled(-1.0, w)
         A = Vector(0.0, minus_w.z, w.y), Vector(w.z, 0.0, minus_w.x), Vector(minus_w.y, w.x, 0.0)
-        return cls(V.v, A, _inertia_times(w))
+        J = (
+            Vector(w.x, 0.0, 0.0),
+            Vector(w.y, w.x, 0.0),
+            Vector(w.z, 0.0, w.x),
+            Vector(0.0, w.y, 0.0),
+            Vector(0.0, w.z, w.y),
+            Vector(0.0, 0.0, w.z),
+        )
+        return cls(V.v, A, J)
 
     @classmethod
     def weight(cls, up: Vector) -> Self:
@@ -109,17 +117,6 @@ class Wrench(NamedTuple):
         x, y, z = ((0, 1, 2), (1, 2, 0), (2, 0, 1))[parameter - MX]
         force = dot(Vector(*(row[x] for row in self.A)), twist.v)
         return plus(force, minus(times(self.a[y], twist.w[z]), times(self.a[z], twist.w[y])))
-
-
-def _inertia_times(w: Vector) -> tuple[Vector, ...]:
-    return (
-        Vector(w.x, 0.0, 0.0),
-        Vector(w.y, w.x, 0.0),
-        Vector(w.z, 0.0, w.x),
-        Vector(0.0, w.y, 0.0),
-        Vector(0.0, w.z, w.y),
-        Vector(0.0, 0.0, w.z),
-    )
 
 
 def energy(V: Twist, up: Vector, height: Term) -> tuple[Term, ...]:
