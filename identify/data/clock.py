@@ -57,7 +57,6 @@ class LogClock:
             finite &= np.isfinite(columns.tau).all(axis=1)
         rows = np.flatnonzero(finite)
         broken = len(finite) - len(rows)
-        backward = 0
         t = columns.t
         forward = t[rows] > np.maximum.accumulate(np.concatenate([[-np.inf], t[rows][:-1]]))
         if len(rows) >= MIN_ROWS and np.mean(~forward) > 0.5:
@@ -112,11 +111,7 @@ class LogClock:
 
     def columns(self, columns: LogColumns) -> LogColumns:
         """Return the rows that count, at their times."""
-        pick = self.kept
-        own = columns.t_tau is not None
-        tau = columns.tau if own else columns.tau[pick]
-        qd, warm = (None if x is None else x[pick] for x in (columns.qd, columns.temperature))
-        return replace(columns, t=self.t, q=columns.q[pick], tau=tau, qd=qd, temperature=warm)
+        return replace(columns.rows(self.kept), t=self.t)
 
     def words(self) -> Iterator[str]:
         """Yield what was done, a sentence each."""

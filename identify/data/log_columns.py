@@ -4,6 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Self
 
+import numpy as np
+import numpy.typing as npt
+
 from idbench.identify.arrays import Array
 from idbench.identify.data.motion_log import TorqueChannel
 from idbench.identify.errors import LogError
@@ -47,6 +50,12 @@ class LogColumns:
     def n(self) -> int:
         """Number of joints."""
         return self.q.shape[1]
+
+    def rows(self, kept: slice | npt.NDArray[np.intp]) -> Self:
+        """Return the columns at some of their times; torques that have times of their own stay whole."""
+        qd, warm = (None if x is None else x[kept] for x in (self.qd, self.temperature))
+        tau = self.tau[kept] if self.t_tau is None else self.tau
+        return replace(self, t=self.t[kept], q=self.q[kept], tau=tau, qd=qd, temperature=warm)
 
     def prefixed(self, joints: Sequence[str]) -> str:
         """Common prefix of the log's names that those of `joints` lack, as in fer_joint1, or else ""."""

@@ -129,28 +129,15 @@ def _parts(sound: LogColumns, clock: LogClock, stretches: list[tuple[float, floa
     """Return the pieces between gaps of positions, and of torques that have times of their own."""
     found = []
     for piece in clock.pieces:
-        qd, warm = (None if x is None else x[piece] for x in (sound.qd, sound.temperature))
-        part = replace(sound, t=sound.t[piece], q=sound.q[piece], qd=qd, temperature=warm)
+        part = sound.rows(piece)
         if part.t_tau is None:
-            found.append(replace(part, tau=sound.tau[piece]))
+            found.append(part)
             continue
         for start, end in stretches:
             rows, own = (np.flatnonzero((t >= start) & (t <= end)) for t in (part.t, part.t_tau))
             if len(rows) >= FEW and len(own) >= FEW:
                 rows = np.arange(max(rows[0] - 1, 0), min(rows[-1] + 2, len(part.t)))
-                qd = None if part.qd is None else part.qd[rows]
-                warm = None if part.temperature is None else part.temperature[rows]
-                found.append(
-                    replace(
-                        part,
-                        t=part.t[rows],
-                        q=part.q[rows],
-                        qd=qd,
-                        temperature=warm,
-                        tau=part.tau[own],
-                        t_tau=part.t_tau[own],
-                    )
-                )
+                found.append(replace(part.rows(rows), tau=part.tau[own], t_tau=part.t_tau[own]))
     return found
 
 
@@ -159,22 +146,16 @@ def _uniform(part: LogColumns, torque: TorqueChannel, fs: float) -> tuple[Motion
     steps = np.diff(part.t)
     as_is = part.t_tau is None and np.abs(steps * fs - 1).max() < 1e-3
     log = MotionLog(fs, part.q, part.tau, torque) if as_is else resample(part.t, part.q, part.tau, torque, fs, part.t_tau)
-    log = replace(log, conditions=_conditions(part, log, as_is=as_is), missing=part.missing)
+    start = part.t[0] if part.t_tau is None else max(part.t[0], part.t_tau[0])
+    at, conditions = start + log.t, part.conditions
+    if not as_is:
+        conditions = {name: np.stack([np.interp(at, part.t, x) for x in y.T], axis=1) for name, y in conditions.items()}
+    log = replace(log, conditions=conditions, missing=part.missing)
     if part.qd is None or not np.isfinite(part.qd).all() or log.samples < LEAST_VELOCITIES:
         return log, None
-    start = 0.0 if as_is else max(part.t[0], part.t_tau[0]) if part.t_tau is not None else part.t[0]
-    qd = part.qd if as_is else scipy.interpolate.CubicSpline(part.t, part.qd)(start + log.t)
+    qd = part.qd if as_is else scipy.interpolate.CubicSpline(part.t, part.qd)(at)
     velocities = Velocities.of(log.q, qd, fs)
     return replace(log, q=velocities.improved(log.q, qd)), velocities
-
-
-def _conditions(part: LogColumns, log: MotionLog, *, as_is: bool) -> dict[str, Array]:
-    """Further columns of a piece, at the times of its log."""
-    if as_is:
-        return part.conditions
-    start = max(part.t[0], part.t_tau[0]) if part.t_tau is not None else part.t[0]
-    at = start + log.t
-    return {name: np.stack([np.interp(at, part.t, x) for x in values.T], axis=1) for name, values in part.conditions.items()}
 
 
 def _round(fs: float) -> float:
