@@ -37,7 +37,7 @@ def with_units(layout: LogLayout, table: LogTable) -> tuple[LogLayout, list[str]
 def _suspected(quantity: str, layout: LogLayout, table: LogTable) -> str:
     """Return the unit that values look like; empty for SI."""
     if quantity == "t":
-        return _time_unit(table, layout.t)
+        return unit_of_times(table.columns[layout.t.columns[0]])
     if quantity == "q":
         return "deg" if _largest(table, layout.q) > FARTHEST else ""
     return _torque_unit(table, layout.tau) if quantity == "tau" else _velocity_unit(table, layout)
@@ -51,10 +51,6 @@ def _values(table: LogTable, source: Source) -> Array:
 
 def _largest(table: LogTable, source: Source) -> float:
     return float(np.nanmax(np.abs(_values(table, source)), initial=0.0))
-
-
-def _time_unit(table: LogTable, source: Source) -> str:
-    return unit_of_times(table.columns[source.columns[0]])
 
 
 def unit_of_times(t: Array) -> str:

@@ -2,7 +2,7 @@
 
 import json
 import re
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -145,11 +145,8 @@ class LogFiles:
     """Where its other files are."""
     layout: LogLayout
     """What its columns are."""
-    tables: dict[Path, LogTable] = None  # type: ignore[assignment]  # made below
-    """What files hold."""
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "tables", dict(self.tables or {}))
+    tables: dict[Path, LogTable] = field(default_factory=dict)
+    """What files hold; those that are read are added."""
 
     @property
     def columns(self) -> LogColumns:
