@@ -8,14 +8,15 @@ import numpy as np
 from idbench.experiments.document import Listing
 from idbench.experiments.loads.known_load import negative_mass
 from idbench.identify import IdentificationError
+from idbench.identify.basis.tree_links import KINDS
 from idbench.identify.loads.drive_gains import VAGUE, GainEstimate
 from idbench.identify.loads.loaded_robot import LETTERS
 from idbench.identify.loads.payload import PayloadEstimate
 from idbench.identify.parameters.bodies import pseudo_inertia
 from idbench.identify.tables import concise
 
-# Of LETTERS.
-UNITS = (*["kg m^2"] * 6, *["kg m"] * 3, "kg")
+UNITS = {x: unit for x, (_, unit) in zip(LETTERS, KINDS.values(), strict=True)}
+"""Units of the parameters of a payload."""
 
 
 def payload_table(ways: Mapping[str, PayloadEstimate], link: str) -> Listing:
@@ -25,8 +26,7 @@ def payload_table(ways: Mapping[str, PayloadEstimate], link: str) -> Listing:
         for p in ways.values()
     ]
     rows = [
-        (name, UNITS[LETTERS.index(name)] if name in LETTERS else "", *(values[name] for values in cells))
-        for name in next(iter(ways.values())).names
+        (name, UNITS.get(name, ""), *(values[name] for values in cells)) for name in next(iter(ways.values())).names
     ]
     return Listing(f"payload, about the origin of the frame of {link}", ("", "unit", *ways), tuple(rows), 2)
 

@@ -12,13 +12,11 @@ import numpy as np
 
 from idbench.identify.data.motion_log import TorqueChannel
 from idbench.identify.errors import IdentificationError, LogError
-from idbench.identify.files.table import SI, factor
+from idbench.identify.files.table import SI, UNITS, factor
 
-OF_SERVOS = ("command", "forward", "on", "voltage")
-"""What columns of logs of servos may be beside: commanded positions, what is commanded beside them, whether torque is on, and
-the supply."""
+QUANTITIES = tuple(UNITS)
+"""What columns may be. Of servos: commanded positions, what is commanded beside them, whether torque is on, and the supply."""
 
-QUANTITIES = ("t", "q", "qd", "tau", "temperature", *OF_SERVOS)  # What columns may be
 UNLOGGED = ""  # Name of the column of a joint of which a quantity was not logged
 SINGULAR = 1e-12  # Determinants below this are none
 SLOWEST, FASTEST = 1e-3, 1e7  # Sampling frequencies [Hz] outside of which a slip is suspected

@@ -45,19 +45,9 @@ UNITS: Mapping[str, Mapping[str, float]] = {
     "on": {"1": 1.0},
     "voltage": {"V": 1.0, "mV": 1e-3},
 }
-"""Units of each quantity of a log."""
+"""Units of each quantity of a log, that of SI first."""
 
-SI = {
-    "t": "s",
-    "q": "rad",
-    "qd": "rad/s",
-    "tau": "N m",
-    "temperature": "degC",
-    "command": "rad",
-    "forward": "N m",
-    "on": "1",
-    "voltage": "V",
-}
+SI = {quantity: next(iter(units)) for quantity, units in UNITS.items()}
 """Units that are taken where a file states none; those of slides are m and N, which are of the same size."""
 
 NEED_GAIN = ("A", "mA", "%")  # Units of efforts that a gain makes torques [N m] of: gain is N m/A, or N m at 100 %
