@@ -68,7 +68,7 @@ class BaseParameters:
         >>> BaseParameters.of(tree, tree_basis(tree)).groupings["ZZR1"]
         'ZZ1 + Ia1 + 0.25 M2'
         """
-        W = _explicit_columns(tree, standard)
+        W = np.moveaxis(columns_at(standard, random_states(tree, _count(tree))), 1, -1).reshape(-1, len(standard.names))
         large = _large(tree, standard, np.linalg.norm(W, axis=0))
         resists = np.array([parameter.kind in FRICTION for parameter in standard.parameters])
         # Random effects are not parameters to be told apart: slow random states hardly show those of slow motion.
@@ -129,11 +129,6 @@ class BaseParameters:
         """Return the values of the base parameters by name, from those of standard parameters; one that is missing is zero."""
         known = np.array([standard.get(name, 0.0) for name in self.standard.names])
         return dict(zip(self.names, map(float, self.base(known)), strict=True))
-
-
-def _explicit_columns(tree: KinematicTree, basis: Basis) -> Array:
-    """Return the columns of the explicit model at random states, shape (joint x state, p)."""
-    return np.moveaxis(columns_at(basis, random_states(tree, _count(tree))), 1, -1).reshape(-1, len(basis.names))
 
 
 def columns_at(basis: Basis, states: Array) -> Array:

@@ -62,7 +62,7 @@ class Chain:
 
     def grid(self, log: MotionLog) -> Grid:
         """Instants of the rows of `log`; raise LogError if it leaves none, SettingError if a setting does not fit it."""
-        return self.operator.grid(log.samples, log.fs, self.margin(log))
+        return Grid.inside(log.samples, log.fs, self.margin(log), self.operator.step(log.fs))
 
     def rows(self, signals: Signals, basis: Basis, model: AbstractModel) -> Rows:
         """Return the rows of a model from the signals of one log.

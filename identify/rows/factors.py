@@ -206,11 +206,6 @@ class Factors:
             values.setflags(write=False)
 
     @classmethod
-    def of(cls, joined: Array, rows: npt.NDArray[np.intp], names: tuple[str, ...]) -> Self:
-        """Return the factors of [W Y], shape (..., kind, count, p + 1)."""
-        return cls(triangular(joined), rows, names)
-
-    @classmethod
     def merged(cls, parts: Sequence[Self]) -> Self:
         """Return the factors of the rows of all parts together."""
         if len(parts) == 1:

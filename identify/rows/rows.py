@@ -12,7 +12,7 @@ from idbench.identify.arrays import HELD, Array
 from idbench.identify.data.motion_log import MotionLog
 from idbench.identify.errors import LogError, SettingError
 from idbench.identify.models import Equations
-from idbench.identify.rows.factors import Factors
+from idbench.identify.rows.factors import Factors, triangular
 from idbench.identify.rows.row_map import RowMap, in_order
 
 PIECE = 6e5  # Samples times joints squared of a piece: columns grow with the joints squared, and take some 100 MB
@@ -112,7 +112,7 @@ class Rows:
         joined = self.joined_by_kind
         if weights is not None:
             joined *= self.by_kind(weights)[..., None]
-        return Factors.of(joined, self.count, self.names)
+        return Factors(triangular(joined), self.count, self.names)
 
     @property
     def joined_by_kind(self) -> Array:

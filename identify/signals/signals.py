@@ -37,11 +37,6 @@ class State:
     conditions: Mapping[str, Array] = field(default_factory=dict)
     """What else the log says, such as temperatures, shape (..., joint or 1, time)."""
 
-    @classmethod
-    def of(cls, q: Array, s: Callable[[Array], Array], conditions: Mapping[str, Array] | None = None) -> Self:
-        """Return the state of positions [rad], shape (..., joint, time)."""
-        return cls(q, s(q), s, conditions or {})
-
     def condition(self, name: str) -> Array:
         """A further column of the log, shape (..., joint or 1, time); raise LogError if there is none."""
         if name not in self.conditions:
@@ -121,12 +116,12 @@ class Signals:
     def state(self) -> State:
         """Prefiltered positions and their derivatives."""
         q = self._prefiltered(self.log.q)
-        expect(self.differentiator, "derivative", self.s(q), q.shape)
+        qd = expect(self.differentiator, "derivative", self.s(q), q.shape)
         derivative, fs = self.differentiator.derivative, self.fs  # not self.s: a circle of references would outlive long pieces
         conditions = {name: np.swapaxes(x, -1, -2) for name, x in self.log.conditions.items()}
         if self.log.poses:
             return State(q, np.zeros_like(q), np.zeros_like, conditions)
-        return State.of(q, lambda x: derivative(x, fs), conditions)
+        return State(q, qd, lambda x: derivative(x, fs), conditions)
 
     @cached_property
     def torque(self) -> Torque:

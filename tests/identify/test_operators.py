@@ -18,6 +18,7 @@ from idbench.identify import (
 )
 from idbench.identify.models import Equations
 from idbench.identify.rows.operators import OPERATORS, Samples
+from idbench.identify.rows.row_map import Grid
 
 FS = 100.0
 T = np.arange(1500) / FS
@@ -54,7 +55,7 @@ def equations(y, c, e, weight, t=T):
 
 def at(operator, sentence):
     """Return the rows of equations, TRIM away from both ends."""
-    grid = operator.grid(sentence.y.shape[-1], sentence.signals.fs, TRIM)
+    grid = Grid.inside(sentence.y.shape[-1], sentence.signals.fs, TRIM, operator.step(sentence.signals.fs))
     return Rows.of(sentence, operator.map(sentence, sentence.weight, grid))
 
 

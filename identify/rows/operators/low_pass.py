@@ -42,19 +42,6 @@ class AbstractOperator(ABC):
     def map(self, equations: Equations, weight: Array, grid: Grid) -> RowMap:
         """Return the linear map from samples, with weights of shape (..., kind of row, time), to the rows of `grid`."""
 
-    @final
-    def grid(self, samples: int, fs: float, trim: float) -> Grid:
-        """Instants of the rows of a log of `samples`, `trim` [s] away from both ends.
-
-        Raises
-        ------
-        LogError
-            If the log leaves no row.
-        SettingError
-            If a setting does not fit the log's sampling frequency.
-        """
-        return Grid.inside(samples, fs, trim, self.step(fs))
-
 
 class AbstractLowPass(AbstractOperator):
     """The paper's parallel filter f_p (Eq. 15-19, 23): zero phase, the same for both sides, then one sample in n_d.
