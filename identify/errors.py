@@ -1,5 +1,6 @@
 """Errors of the identification package: each says the value, what is allowed and what to try. And checks of settings."""
 
+from collections.abc import Callable, Mapping
 from numbers import Real
 
 import numpy as np
@@ -61,34 +62,29 @@ class KinematicsError(IdentificationError):
 
 def require_positive(**settings: float) -> None:
     """Raise SettingError unless every setting is a finite number above zero."""
-    for name, value in settings.items():
-        if not (_is_number(value) and value > 0):
-            raise SettingError(f"{name} = {value!r} must be a finite number above 0")
+    _require(settings, lambda x: x > 0, "a finite number above 0")
 
 
 def require_finite(**settings: float) -> None:
     """Raise SettingError unless every setting is a finite number."""
-    for name, value in settings.items():
-        if not _is_number(value):
-            raise SettingError(f"{name} = {value!r} must be a finite number")
+    _require(settings, lambda _: True, "a finite number")
 
 
 def require_not_negative(**settings: float) -> None:
     """Raise SettingError unless every setting is a finite number, 0 or above."""
-    for name, value in settings.items():
-        if not (_is_number(value) and value >= 0):
-            raise SettingError(f"{name} = {value!r} must be a finite number, 0 or above")
+    _require(settings, lambda x: x >= 0, "a finite number, 0 or above")
 
 
 def require_whole(least: int, **settings: int) -> None:
     """Raise SettingError unless every setting is a whole number, at least `least`."""
+    _require(settings, lambda x: x == int(x) and x >= least, f"a whole number, at least {least}")
+
+
+def _require(settings: Mapping[str, float], fits: Callable[[float], bool], what: str) -> None:
     for name, value in settings.items():
-        if not _is_number(value) or value != int(value) or value < least:
-            raise SettingError(f"{name} = {value!r} must be a whole number, at least {least}")
-
-
-def _is_number(value: object) -> bool:
-    return isinstance(value, Real) and not isinstance(value, bool) and bool(np.isfinite(float(value)))
+        is_number = isinstance(value, Real) and not isinstance(value, bool) and np.isfinite(float(value))
+        if not (is_number and fits(value)):
+            raise SettingError(f"{name} = {value!r} must be {what}")
 
 
 def require_below_nyquist(name: str, frequency: float, fs: float) -> None:
