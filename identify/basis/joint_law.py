@@ -104,27 +104,21 @@ class Armature(AbstractConservativeBlock):
     Of a rotor that turns fast behind a gear; the small torques it makes when its housing turns are left out, as in MuJoCo.
     """
 
-    joints: tuple[int, ...] | None = None
-    """Joints that have one, from 0; all by default."""
-
     def parameters(self, n: int) -> tuple[Parameter, ...]:
-        """Return Ia of each joint that has one."""
-        return tuple(map(_rotor, self._numbers(n)))
+        """Return Ia of each joint."""
+        return tuple(map(_rotor, range(n)))
 
     def explicit(self, state: State) -> BlockColumns:
         """Return qdd (Eq. 5, 6)."""
-        return {(j, _rotor(j)): state.qdd[..., j, :] for j in self._numbers(state.n)}
+        return {(j, _rotor(j)): state.qdd[..., j, :] for j in range(state.n)}
 
     def momentum(self, state: State) -> BlockColumns:
         """Return qd (Eq. 9)."""
-        return {(j, _rotor(j)): state.qd[..., j, :] for j in self._numbers(state.n)}
+        return {(j, _rotor(j)): state.qd[..., j, :] for j in range(state.n)}
 
     def energy(self, state: State) -> BlockColumns:
         """Return qd^2 / 2 (Eq. 10)."""
-        return {(0, _rotor(j)): 0.5 * state.qd[..., j, :] ** 2 for j in self._numbers(state.n)}
-
-    def _numbers(self, n: int) -> tuple[int, ...]:
-        return tuple(range(n)) if self.joints is None else self.joints
+        return {(0, _rotor(j)): 0.5 * state.qd[..., j, :] ** 2 for j in range(state.n)}
 
 
 def _rotor(j: int) -> Parameter:

@@ -228,8 +228,8 @@ def tree_basis(tree: KinematicTree, laws: tuple[AbstractBlock, ...] = (ViscousFr
     driven = tuple(j for j, joint in enumerate(tree.joints) if joint.armature)
     sprung = {j: joint.spring for j, joint in enumerate(tree.joints) if joint.spring is not None}
     rest = tuple(sprung.get(j, 0.0) for j in range(tree.n))
-    springs = (Spring(rest, tuple(sprung)),) if sprung else ()
-    blocks = TreeLinks(tree), Armature(driven), *springs, *laws, *_of_couplings(tree, laws)
+    springs = (OfJoints(Spring(rest), tuple(sprung)),) if sprung else ()
+    blocks = TreeLinks(tree), OfJoints(Armature(), driven), *springs, *laws, *_of_couplings(tree, laws)
     parameters = [parameter for block in blocks for parameter in block.parameters(tree.n)]
     kept = tuple(sorted(parameters, key=lambda p: -1 if p.joint is None else p.joint))
     slides = tuple(j for j, joint in enumerate(tree.joints) if joint.kind == "slide")

@@ -18,6 +18,7 @@ from idbench.identify import (
     Joint,
     KinematicTree,
     Offset,
+    OfJoints,
     Parameter,
     Problem,
     SettingError,
@@ -112,7 +113,7 @@ def test_the_offset_of_a_vertical_slide_is_grouped_with_its_weight():
 
 def test_the_scaras_tree_spans_its_closed_form_and_gives_the_same_estimates(log, rng):
     tree = kinematic_tree(Robot.load("scara"))
-    standard = Basis(2, (TreeLinks(tree), Armature((0,)), ViscousFriction(), CoulombFriction()))
+    standard = Basis(2, (TreeLinks(tree), OfJoints(Armature(), (0,)), ViscousFriction(), CoulombFriction()))
     found = BaseParameters.of(tree, standard)
     states = rng.uniform(-3, 3, (3, 2, 200))
     mine, closed = columns(found.basis, *states), columns(scara(), *states)
