@@ -10,9 +10,9 @@ import numpy as np
 from idbench.experiments.errors import ExperimentError
 from idbench.identify import BaseParameters, Basis
 from idbench.identify.basis.block import BODY, FRICTION, Kind
-from idbench.identify.parameters.prior import FilePrior, NormalPrior, PriorSum
+from idbench.identify.parameters.prior import FilePrior, normal_prior, prior_sum
 from idbench.identify.plugins import did_you_mean
-from idbench.identify.rows.factors import AbstractPrior
+from idbench.identify.rows.factors import Prior
 
 KINDS: Mapping[str, frozenset[Kind]] = {"links": BODY, "armatures": frozenset({"rotor inertia"}), "friction": FRICTION}
 """Groups of parameters that can be held together, at the values of the robot's file."""
@@ -134,7 +134,7 @@ class RoughlyKnown:
             values[name] = Trust(value, sigma, relative)
         return cls(links, share, values)
 
-    def prior(self, grouping: BaseParameters, basis: Basis, filed: Mapping[str, float], share: float | None) -> AbstractPrior:
+    def prior(self, grouping: BaseParameters, basis: Basis, filed: Mapping[str, float], share: float | None) -> Prior:
         """Prior of the parameters of a basis.
 
         Raises
@@ -145,14 +145,14 @@ class RoughlyKnown:
         K = grouping.K[[grouping.basis.places[parameter] for parameter in basis.parameters]]
         standard = grouping.standard.parameters
         values = np.array([filed.get(p.name, 0.0) for p in standard])
-        parts, known = list[AbstractPrior](), np.full(len(standard), inf)
+        parts, known = list[Prior](), np.full(len(standard), inf)
         stated = values.copy()
         for name, trust in self.values.items():
             if name in basis.names and name not in grouping.standard.names:
                 place = basis.names.index(name)
                 value, sigma = trust.of(float(K[place] @ values))
                 _require_sigma(name, sigma)
-                parts.append(NormalPrior.of(np.eye(len(basis.names))[:, [place]], np.array([value]), np.array([sigma])))
+                parts.append(normal_prior(np.eye(len(basis.names))[:, [place]], np.array([value]), np.array([sigma])))
                 continue
             places = [i for i, p in enumerate(standard) if name in (p.name, p.symbol) or p.kind in KINDS.get(name, ())]
             if not places:
@@ -168,7 +168,7 @@ class RoughlyKnown:
                 raise ExperimentError(
                     f"--prior: {_grouped(grouping, idle)}: say of all parts, hold them (--hold), or leave it out"
                 )
-            parts.append(NormalPrior.of(K, stated, known))
+            parts.append(normal_prior(K, stated, known))
         if self.links:
             given = {p.name for p in (*grouping.standard.held, *grouping.standard.tied) if p.kind in BODY}
             if given:
@@ -177,7 +177,7 @@ class RoughlyKnown:
                     "leave one out"
                 )
             parts.append(FilePrior(K, standard, values, share or self.share or SHARE))
-        return parts[0] if len(parts) == 1 else PriorSum(tuple(parts))
+        return parts[0] if len(parts) == 1 else prior_sum(parts)
 
 
 def _require_sigma(name: str, sigma: float) -> None:

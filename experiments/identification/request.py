@@ -26,8 +26,8 @@ from idbench.identify import (
 from idbench.identify.blame import blamed
 from idbench.identify.estimators.settle import settled
 from idbench.identify.models import THREE
-from idbench.identify.parameters.prior import PriorSum
-from idbench.identify.rows.factors import AbstractPrior
+from idbench.identify.parameters.prior import prior_sum
+from idbench.identify.rows.factors import Prior
 from idbench.identify.signals.masks import ReversalMask
 from idbench.sim.scenario.scenario import Scenario
 
@@ -131,13 +131,13 @@ class Request:
             prior = self._prior(basis, tuple(logs))
             return settled(Problem(tuple(logs), basis, ExplicitModel(), self.processing, simulation, prior))
 
-    def _prior(self, basis: Basis, logs: tuple[MotionLog, ...]) -> AbstractPrior | None:
+    def _prior(self, basis: Basis, logs: tuple[MotionLog, ...]) -> Prior | None:
         """Prior of the parameters: of smooth functions by their sizes, of others as stated."""
         known = self.robot_model.prior(self.share)
         if not places_of(basis)[0]:
             return known
         functions = prior_of(basis, self.smooth or sizes_of(logs))
-        return functions if known is None else PriorSum((functions, known))
+        return functions if known is None else prior_sum((functions, known))
 
     def _simulation(self, logs: tuple[MotionLog, ...]) -> Simulation:
         """Simulation of the robot, for estimators that need it."""

@@ -15,7 +15,7 @@ from idbench.experiments.requests.shared import Parameters
 from idbench.identify import BLOCKS, AbstractJointLaw, BaseParameters, Basis, KinematicTree, SettingError, tree_basis
 from idbench.identify.basis.block import named
 from idbench.identify.parameters.base_parameters import in_letters_of_the_paper
-from idbench.identify.rows.factors import AbstractPrior
+from idbench.identify.rows.factors import Prior
 from idbench.identify.tables import html_table, text_table
 from idbench.sim.frictions import AbstractFrictionLaw
 from idbench.sim.robot.mounting import PLAIN, Mounting, with_values
@@ -77,7 +77,7 @@ class RobotModel:
         """Whether the log decides how near links are to those of the file."""
         return bool(self.asked.prior) and self.roughly_known.links and self.roughly_known.share is None
 
-    def prior(self, share: float | None = None) -> AbstractPrior | None:
+    def prior(self, share: float | None = None) -> Prior | None:
         """Prior of the parameters, links to a `share` of the file's; None if there is none."""
         if not self.asked.prior:
             return None

@@ -3,7 +3,8 @@
 import numpy as np
 
 from idbench.identify import Basis, MotionLog
-from idbench.identify.parameters.prior import NormalPrior
+from idbench.identify.parameters.prior import normal_prior
+from idbench.identify.rows.factors import Prior
 
 BEGIN = 0.1
 """Standard deviation of the functions, over the rms torque, where the evidence begins, and where no log has been asked."""
@@ -21,8 +22,8 @@ def places_of(basis: Basis) -> tuple[list[int], list[int]]:
     return [i for i, _ in found], [joint for _, joint in found]
 
 
-def prior_of(basis: Basis, sizes: tuple[float, ...]) -> NormalPrior:
+def prior_of(basis: Basis, sizes: tuple[float, ...]) -> Prior:
     """Prior of the functions: they are near zero."""
     places, joints = places_of(basis)
     eye = np.eye(len(basis.parameters))[:, places]
-    return NormalPrior.of(eye, np.zeros(len(places)), np.array(sizes)[joints])
+    return normal_prior(eye, np.zeros(len(places)), np.array(sizes)[joints])

@@ -20,7 +20,7 @@ from idbench.identify.noise.restricted_likelihood import likely, likely_levels
 from idbench.identify.noise.row_weights import floor_of, reciprocal_root
 from idbench.identify.noise.white_noise import count_noise, repeats, residual_level, torque_noise, white_noise
 from idbench.identify.rows.chain import Chain
-from idbench.identify.rows.factors import AbstractPrior, Factors, LeastSquaresFit, triangular
+from idbench.identify.rows.factors import Factors, LeastSquaresFit, Prior, triangular
 from idbench.identify.rows.rows import Rows, is_long
 from idbench.identify.signals.signals import Signals
 
@@ -62,7 +62,7 @@ class Problem:
     """Signal processing, of all models; `own_chain` makes the rows of this one."""
     simulation: Simulation = Simulation()  # noqa: RUF009  # frozen
     """How the robot is simulated, for estimators that need it."""
-    prior: AbstractPrior | None = None
+    prior: Prior | None = None
     """What is known of the parameters before."""
     _signals: tuple[Signals, ...] = field(default=(), repr=False)
     _explicit: "Problem | None" = field(default=None, repr=False)

@@ -9,7 +9,7 @@ import numpy.typing as npt
 from idbench.identify.arrays import TINY, Array
 from idbench.identify.basis.block import BODY, Parameter
 from idbench.identify.parameters.bodies import Bodies, nearest
-from idbench.identify.rows.factors import AbstractPrior, triangular
+from idbench.identify.rows.factors import Prior, triangular
 
 ROUNDS, CLOSE = 60, 0.01  # Iterations of the evidence at most, and the relative change of a size at which they end
 LEAST = 1e-3  # Least size, over the one that the evidence begins with: no log shows a thousandth of a torque
@@ -20,34 +20,23 @@ DECIDED = 0.1
 PLAIN = 1e-12  # Share of the largest variance that every combination is taken to have at least: more than that is rounding
 
 
-@dataclass(frozen=True, eq=False)
-class NormalPrior:
-    """Values with standard deviations."""
+def normal_prior(K: Array, values: Array, sigma: Array) -> Prior:
+    """Prior of base parameters K x from standard values with standard deviations, infinite where unknown.
 
-    known: Array
-    """[P, P x0], shape (m, p + 1)."""
+    A base parameter of which a part is not known is not known at all.
 
-    @classmethod
-    def of(cls, K: Array, values: Array, sigma: Array) -> "NormalPrior":
-        """Prior of base parameters K x from standard values with standard deviations, infinite where unknown.
-
-        A base parameter of which a part is not known is not known at all.
-
-        Parameters
-        ----------
-        K : Array, shape (b, p)
-            What base parameters are made of.
-        values, sigma : Array, shape (p,)
-            Standard values, and their standard deviations.
-        """
-        known = np.isfinite(sigma)
-        rows = (K[:, known] != 0).any(axis=1) & ~(K[:, ~known] != 0).any(axis=1)
-        own = K[np.ix_(rows, known)]
-        return cls(_rows(own @ values[known], (own * sigma[known] ** 2) @ own.T, rows))
-
-    def rows(self, R: Array) -> Array:
-        """Return them."""
-        return self.known
+    Parameters
+    ----------
+    K : Array, shape (b, p)
+        What base parameters are made of.
+    values, sigma : Array, shape (p,)
+        Standard values, and their standard deviations.
+    """
+    known = np.isfinite(sigma)
+    places = (K[:, known] != 0).any(axis=1) & ~(K[:, ~known] != 0).any(axis=1)
+    own = K[np.ix_(places, known)]
+    rows = _rows(own @ values[known], (own * sigma[known] ** 2) @ own.T, places)
+    return lambda _: rows
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +61,7 @@ class FilePrior:
     share: float
     """Relative change of a link that is expected; the weight is its inverse square."""
 
-    def rows(self, R: Array) -> Array:
+    def __call__(self, R: Array) -> Array:
         """Prior rows at the best links for R."""
         links = np.array([p.kind in BODY for p in self.parameters])
         own = (self.K[:, links] != 0).any(axis=1) & ~(self.K[:, ~links] != 0).any(axis=1)
@@ -140,21 +129,17 @@ def evident_sizes(R: Array, groups: Sequence[npt.NDArray[np.intp]], sizes: Array
     return sizes
 
 
-@dataclass(frozen=True, eq=False)
-class PriorSum:
-    """Several."""
+def prior_sum(parts: Sequence[Prior]) -> Prior:
+    """Prior of several, each linearized beside the rows and those before it."""
 
-    parts: tuple[AbstractPrior, ...]
-    """Each."""
-
-    def rows(self, R: Array) -> Array:
-        """Return the rows of all; each is linearized as if it were the only one."""
-        found = R
-        every = list[Array]()
-        for part in self.parts:
-            every.append(part.rows(found))
+    def rows(R: Array) -> Array:
+        found, every = R, list[Array]()
+        for part in parts:
+            every.append(part(found))
             found = triangular(np.concatenate([found, every[-1]]))
         return np.concatenate(every)
+
+    return rows
 
 
 def _rows(mean: Array, covariance: Array, places: Array) -> Array:

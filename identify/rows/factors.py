@@ -1,10 +1,10 @@
 """Triangular factors: all that least squares needs to know of rows, however many there are."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from functools import cached_property
-from typing import NamedTuple, Protocol, Self
+from typing import NamedTuple, Self, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -19,11 +19,9 @@ NOISE = 1e-3
 """Share of the measurements that counts as noise at least beside what is known before: rows as few as parameters show none."""
 
 
-class AbstractPrior(Protocol):
-    """Something that is known of parameters before any log."""
-
-    def rows(self, R: Array) -> Array:
-        """Return [P, P x0] with P (x - x0) of variance 1, shape (m, p + 1), for R of rows in units of their noise."""
+Prior: TypeAlias = Callable[[Array], Array]
+"""What is known of parameters before any log: R of rows in units of their noise -> [P, P x0], P (x - x0) of variance 1, shape
+(m, p + 1)."""
 
 
 class Status(IntEnum):
@@ -197,7 +195,7 @@ class Factors:
     """Numbers of rows that are not void, shape (..., kind)."""
     names: tuple[str, ...]
     """Names of X."""
-    prior: AbstractPrior | None = None
+    prior: Prior | None = None
     """What is known before."""
     _fits: list[LeastSquaresFit] = field(default_factory=list, repr=False)
 
@@ -213,7 +211,7 @@ class Factors:
         R = triangular(np.concatenate([part.R for part in parts], axis=-2))
         return cls(R, np.sum([part.rows for part in parts], axis=0), parts[0].names)
 
-    def known(self, prior: AbstractPrior | None) -> Self:
+    def known(self, prior: Prior | None) -> Self:
         """Return the factors with something that is known before."""
         return self if prior is None else replace(self, prior=prior, _fits=[])
 
@@ -280,9 +278,9 @@ class Factors:
         return np.where(np.isfinite(level), np.maximum(level, floor), 1.0)
 
 
-def prior_rows(prior: AbstractPrior, R: Array, sigma: Array) -> Array:
+def prior_rows(prior: Prior, R: Array, sigma: Array) -> Array:
     """Return the rows of a prior beside those of R whose noise is `sigma`, run by run, shape (..., m, p + 1)."""
-    found = [s * prior.rows(r / s) for r, s in zip(R.reshape(-1, *R.shape[-2:]), np.maximum(sigma.ravel(), TINY), strict=True)]
+    found = [s * prior(r / s) for r, s in zip(R.reshape(-1, *R.shape[-2:]), np.maximum(sigma.ravel(), TINY), strict=True)]
     return np.reshape(found, (*R.shape[:-2], *found[0].shape))
 
 

@@ -17,7 +17,7 @@ from idbench.identify import (
 from idbench.identify.basis import CoulombFriction, Offset, ViscousFriction, tree_basis
 from idbench.identify.data.kinematics import INERTIAL
 from idbench.identify.parameters.bodies import inertial, pseudo_inertia
-from idbench.identify.parameters.prior import FilePrior, NormalPrior, PriorSum, evident_sizes
+from idbench.identify.parameters.prior import FilePrior, evident_sizes, normal_prior, prior_sum
 from idbench.identify.rows.factors import prior_rows
 from idbench.sim.robot.robot import Robot
 from idbench.sim.robot.tree import kinematic_tree, standard_parameters
@@ -55,7 +55,7 @@ def test_a_value_and_its_sigma_are_one_more_measurement(noisy, grouping, acronym
     """
     k = grouping.names.index("Fs2")
     plain = estimate(problem_of(noisy, grouping), ESTIMATORS.create(acronym))
-    prior = NormalPrior.of(np.eye(8)[:, k : k + 1], np.array([0.12]), np.array([0.002]))
+    prior = normal_prior(np.eye(8)[:, k : k + 1], np.array([0.12]), np.array([0.002]))
     found = estimate(problem_of(noisy, grouping, prior), ESTIMATORS.create(acronym))
     rows = found.solution.known
     unit = rows[0, k] * 0.002  # 1 where rows are divided by their noise
@@ -78,7 +78,7 @@ def test_sigma_is_right_where_the_prior_is(log, grouping, values):
     sigma = 0.3 * np.abs(true[places])
     for _ in range(200):
         believed = true[places] + sigma * rng.standard_normal(len(places))
-        prior = NormalPrior.of(np.eye(8)[:, places], believed, sigma)
+        prior = normal_prior(np.eye(8)[:, places], believed, sigma)
         tau = short.tau + [5.0, 0.25] * rng.standard_normal(short.tau.shape)
         one = MotionLog(log.fs, short.q, tau, log.torque)
         found = estimate(problem_of(one, grouping, prior), ESTIMATORS.create("GLS"))
@@ -91,9 +91,9 @@ def test_what_is_grouped_with_something_unknown_is_not_known(grouping, values):
     K, names = grouping.K, grouping.standard.names
     sigma = np.full(len(names), np.inf)
     sigma[names.index("Ia1")] = 0.1
-    assert not len(NormalPrior.of(K, values, sigma).known)
+    assert not len(normal_prior(K, values, sigma)(np.eye(len(K) + 1)))
     sigma[[names.index("ZZ1"), names.index("M2")]] = 0.2, 0.4
-    (row,) = NormalPrior.of(K, values, sigma).known
+    (row,) = normal_prior(K, values, sigma)(np.eye(len(K) + 1))
     variance = 0.1**2 + 0.2**2 + (0.25 * 0.4) ** 2
     assert row[grouping.names.index("ZZR1")] == pytest.approx(1 / np.sqrt(variance))
     assert row[-1] * np.sqrt(variance) == pytest.approx(3.5)
@@ -141,16 +141,16 @@ def test_a_log_that_determines_nothing_has_an_estimate_with_a_prior(log, groupin
 
 
 def test_several_priors_add(grouping, values):
-    friction = NormalPrior.of(np.eye(8)[:, [1]], np.array([0.05]), np.array([0.01]))
+    friction = normal_prior(np.eye(8)[:, [1]], np.array([0.05]), np.array([0.01]))
     links = FilePrior(grouping.K, grouping.standard.parameters, values, 0.2)
     R = np.diag([1e2] * 9)
-    both = PriorSum((friction, links)).rows(R)
-    assert len(both) == len(friction.rows(R)) + len(links.rows(R))
+    both = prior_sum((friction, links))(R)
+    assert len(both) == len(friction(R)) + len(links(R))
 
 
 @pytest.mark.parametrize("acronym", ["TLS", "IRLS", "ML"])
 def test_estimators_that_take_no_prior_say_so(noisy, grouping, acronym):
-    prior = NormalPrior.of(np.eye(8)[:, [1]], np.array([0.05]), np.array([0.01]))
+    prior = normal_prior(np.eye(8)[:, [1]], np.array([0.05]), np.array([0.01]))
     with pytest.raises(IdentificationError, match="takes nothing that is known before: use GLS, WLS or OLS"):
         estimate(problem_of(noisy, grouping, prior), ESTIMATORS.create(acronym))
 
@@ -162,7 +162,7 @@ def test_the_part_of_the_prior_is_what_a_change_of_it_makes(noisy, grouping, acr
     values, sigma = np.array([0.5, 0.1]), np.array([0.05, 0.002])
 
     def fit(change):
-        prior = NormalPrior.of(np.eye(8)[:, places], values + change, sigma)
+        prior = normal_prior(np.eye(8)[:, places], values + change, sigma)
         return estimate(problem_of(noisy, grouping, prior), ESTIMATORS.create(acronym))
 
     base = fit(np.zeros(2))
@@ -180,7 +180,7 @@ def test_thin_links_are_known_in_all_directions(noisy, grouping, values):
         rod[[first.index(f"{x}{j}") for x in INERTIAL]] = inertial(S)
     prior = FilePrior(grouping.K, grouping.standard.parameters, rod, 0.1)
     R = problem_of(noisy, grouping).independent_factor
-    rows = prior.rows(R)
+    rows = prior(R)
     assert np.linalg.matrix_rank(rows[:, :-1]) == len(rows)
 
 
@@ -216,7 +216,7 @@ def test_a_joint_that_turned_one_way_has_friction_where_the_others_show_no_offse
         Y = R[:, :-1] @ true
         Y[-1] = R[-1, -1]  # the noise
         measured = np.column_stack([R[:, :-1], Y])
-        known = np.concatenate([measured, prior.rows(measured)])
+        known = np.concatenate([measured, prior(measured)])
         found[offset] = dict(zip(names, np.linalg.lstsq(known[:, :-1], known[:, -1])[0], strict=True))
         assert found[offset]["Fs2"] + found[offset]["off2"] == pytest.approx(true[names.index("Fs2")], abs=0.002)
         assert found[offset]["off1"] == pytest.approx(offset, abs=0.01)
