@@ -70,8 +70,8 @@ class LogClock:
         rough = {word: _roughness(times, columns.q[rows]) for word, times in clocks.items()}
         word = next(word for word, left in rough.items() if ROUGHER * left <= min(rough.values()))
         relative = {name: value / max(rough["stamps"], 1e-300) for name, value in rough.items()}
-        late = clocks[word] - t[rows] if word != "stamps" else _about_steady(t[rows])
-        jitter = float(np.std(late))
+        steady = clocks.get("steady", t[rows]) if word == "stamps" else clocks[word]
+        jitter = float(np.std(steady - t[rows]))
         return cls(rows, clocks[word], repeated, backward, broken, word, jitter, relative)
 
     @property
@@ -214,12 +214,6 @@ def _numbered(t: Array, fs: float) -> Array:
     # A sample later at least from row to row: what was lost before a row only grows.
     lost = scipy.optimize.isotonic_regression(fs * since - phase - order).x
     return np.asarray(order + np.round(lost), dtype=np.float64)
-
-
-def _about_steady(t: Array) -> Array:
-    """Deviation of times from a steady clock; nothing where they are not of one."""
-    clocks = dict(_clocks(t))
-    return clocks["steady"] - t if "steady" in clocks else np.zeros(1)
 
 
 def _roughness(t: Array, q: Array) -> float:
