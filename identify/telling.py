@@ -29,15 +29,11 @@ def stage(what: str) -> Iterator[None]:
     """Tell what the block works at; stages may stand in each other."""
     token = _within.set((*_within.get(), what))
     try:
-        _tell()
+        if (listener := _listener.get()) is not None:
+            listener(": ".join(_within.get()))
         yield
     finally:
         _within.reset(token)
-
-
-def _tell() -> None:
-    if (listener := _listener.get()) is not None:
-        listener(": ".join(_within.get()))
 
 
 @contextmanager

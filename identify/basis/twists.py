@@ -93,12 +93,6 @@ def apply(M: Matrix, v: Vector) -> Vector:
     return Vector(*(dot(row, v) for row in M))
 
 
-def transposed(M: Matrix) -> Matrix:
-    """Return M'."""
-    x, y, z = M
-    return Vector(x.x, y.x, z.x), Vector(x.y, y.y, z.y), Vector(x.z, y.z, z.z)
-
-
 def vector(values: Array) -> Vector:
     """Return a vector of constants."""
     return Vector(*(float(value) for value in values))
@@ -145,7 +139,7 @@ class Placement:
         self._along = matrix(along)
         self._across = matrix(np.eye(3) - along)
         self._rotation = matrix(joint.rotation)
-        self._back = transposed(self._rotation)
+        self._back = matrix(joint.rotation.T)
         self._hinge = joint.kind == "hinge"
         position = vector(joint.position)
         anchor = vector(joint.anchor)

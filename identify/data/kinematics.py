@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
-import numpy.typing as npt
 
 from idbench.identify.arrays import Array, frozen
 from idbench.identify.errors import KinematicsError, SettingError
@@ -60,7 +59,10 @@ class Joint:
         if self.kind not in get_args(Kind):
             raise KinematicsError(f"joint {self.name}: kind {self.kind!r} is none of {', '.join(get_args(Kind))}")
         for name, shape in (("position", (3,)), ("rotation", (3, 3)), ("axis", (3,)), ("anchor", (3,))):
-            object.__setattr__(self, name, self._checked(name, getattr(self, name), shape))
+            array = frozen(getattr(self, name))
+            if array.shape != shape or not np.isfinite(array).all():
+                raise KinematicsError(f"joint {self.name}: {name} = {array.tolist()} must be finite, of shape {shape}")
+            object.__setattr__(self, name, array)
         length = np.linalg.norm(self.axis)
         if length == 0:
             raise KinematicsError(f"joint {self.name}: the axis has no length")
@@ -68,12 +70,6 @@ class Joint:
             raise KinematicsError(f"joint {self.name}: {self.rotation.tolist()} is not a rotation")
         object.__setattr__(self, "axis", frozen(_clean(self.axis / length)))
         object.__setattr__(self, "rotation", frozen(_clean(self.rotation)))
-
-    def _checked(self, name: str, value: npt.ArrayLike, shape: tuple[int, ...]) -> Array:
-        array = frozen(value)
-        if array.shape != shape or not np.isfinite(array).all():
-            raise KinematicsError(f"joint {self.name}: {name} = {array.tolist()} must be finite, of shape {shape}")
-        return array
 
 
 @dataclass(frozen=True)
