@@ -1,13 +1,14 @@
 """Torques of links whose parameters are known, by recursive Newton and Euler: linear in the number of joints."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
+from typing import TypeAlias
 
 import numpy as np
 
 from idbench.identify.arrays import Array
 from idbench.identify.basis.basis import Basis
-from idbench.identify.basis.block import AbstractBlock, BlockColumns, Parameter
+from idbench.identify.basis.block import Parameter
 from idbench.identify.basis.tree_links import KINDS, MX, M, TreeLinks, Wrench, parameters_of_link
 from idbench.identify.basis.twists import Term, Twists, Vector, add, apply, cross, dot, is_zero, plus, scaled
 from idbench.identify.data.kinematics import GROUND, KinematicTree
@@ -64,40 +65,35 @@ def torques(basis: Basis, state: State, X: Array) -> Array:
     X : Array, shape (..., p)
         Its parameters.
     """
-    total = np.zeros(np.broadcast_shapes(state.q.shape, (*X.shape[:-1], 1, 1)))
-    for block in basis.blocks:
-        if isinstance(block, TreeLinks):
-            _add(total, link_torques(block.tree, state, _values(basis, block, X)))
-        else:
-            _add_columns(total, basis, block, block.explicit(state), X)
-    return total
+    return _total(basis, state, X, "explicit", lambda tree, values: link_torques(tree, state, values))
 
 
 def momenta(basis: Basis, state: State, X: Array) -> Array:
     """Return M(q) qd (Eq. 9), shape (..., joint, time): torques of accelerations qd at rest, without weight."""
-    total = np.zeros(np.broadcast_shapes(state.q.shape, (*X.shape[:-1], 1, 1)))
     begun = State(state.q, np.zeros_like(state.qd), lambda _: state.qd, state.conditions)
+    still = np.zeros(3)
+    return _total(basis, state, X, "momentum", lambda tree, values: link_torques(replace(tree, gravity=still), begun, values))
+
+
+Links: TypeAlias = Callable[[KinematicTree, Mapping[Parameter, Term]], list[Term]]
+"""Links and the values of their parameters -> what they add to each joint."""
+
+
+def _total(basis: Basis, state: State, X: Array, function: str, links: Links) -> Array:
+    """Return what all blocks add, shape (..., joint, time): links as `links` has it, others by their columns."""
+    total = np.zeros(np.broadcast_shapes(state.q.shape, (*X.shape[:-1], 1, 1)))
     for block in basis.blocks:
         if isinstance(block, TreeLinks):
-            tree = replace(block.tree, gravity=np.zeros(3))
-            _add(total, link_torques(tree, begun, _values(basis, block, X)))
-        else:
-            _add_columns(total, basis, block, block.momentum(state), X)
+            for j, torque in enumerate(links(block.tree, _values(basis, block, X))):
+                total[..., j, :] += torque
+            continue
+        held = basis.held_of(block)
+        for (row, parameter), column in getattr(block, function)(state).items():
+            if (value := basis.value(parameter, X)) is not None:
+                total[..., row, :] += value[..., None] * column
+            if parameter in held:
+                total[..., row, :] += np.asarray(held[parameter])[..., None] * column
     return total
-
-
-def _add(total: Array, each: list[Term]) -> None:
-    for j, torque in enumerate(each):
-        total[..., j, :] += torque
-
-
-def _add_columns(total: Array, basis: Basis, block: AbstractBlock, columns: BlockColumns, X: Array) -> None:
-    held = basis.held_of(block)
-    for (row, parameter), column in columns.items():
-        if (value := basis.value(parameter, X)) is not None:
-            total[..., row, :] += value[..., None] * column
-        if parameter in held:
-            total[..., row, :] += np.asarray(held[parameter])[..., None] * column
 
 
 def _values(basis: Basis, block: TreeLinks, X: Array) -> dict[Parameter, Term]:
