@@ -83,17 +83,20 @@ def consistent_parameters(
     root, given = _root(covariance), _sized(grouping, X, covariance, np.array(given, dtype=np.float64))
     rows, columns = _touched(grouping, X)
     standard = _as_estimated(grouping, X, given, columns)
-    if not rows.any():
-        return _found(grouping, X, root, standard, rows)
-    K = grouping.K[np.ix_(rows, columns)]
-    own, sigma = _root(covariance[np.ix_(rows, rows)]), np.sqrt(np.diagonal(covariance))[rows]
-    parameters = [p for p, there in zip(grouping.standard.parameters, columns, strict=True) if there]
-    bodies = Bodies(parameters, given[columns], np.maximum(np.abs(given[columns]), least_change(K, sigma)))
-    rest = (X - grouping.base(np.where(columns, 0.0, standard)))[rows]
-    A = np.asarray(np.linalg.solve(own, np.column_stack([K, rest])), dtype=np.float64)
-    found = nearest(A[:, :-1], A[:, -1], bodies, weight)
-    standard[columns] = bodies.with_extent(found)
-    return _found(grouping, X, root, standard, rows)
+    if rows.any():
+        K = grouping.K[np.ix_(rows, columns)]
+        own, sigma = _root(covariance[np.ix_(rows, rows)]), np.sqrt(np.diagonal(covariance))[rows]
+        parameters = [p for p, there in zip(grouping.standard.parameters, columns, strict=True) if there]
+        bodies = Bodies(parameters, given[columns], np.maximum(np.abs(given[columns]), least_change(K, sigma)))
+        rest = (X - grouping.base(np.where(columns, 0.0, standard)))[rows]
+        A = np.asarray(np.linalg.solve(own, np.column_stack([K, rest])), dtype=np.float64)
+        found = nearest(A[:, :-1], A[:, -1], bodies, weight)
+        standard[columns] = bodies.with_extent(found)
+    base, whole = grouping.base(standard), root @ root.T
+    off = (base - X)[rows]
+    distance = float(np.linalg.norm(np.linalg.solve(_root(whole[np.ix_(rows, rows)]), off))) if rows.any() else 0.0
+    departure = (base - X) / np.sqrt(np.diagonal(whole))
+    return Consistent(grouping.standard.names, standard, base, departure, distance, int(rows.sum()))
 
 
 def least_change(K: Array, sigma: Array) -> Array:
@@ -144,15 +147,6 @@ def _as_estimated(grouping: BaseParameters, X: Array, given: Array, columns: npt
         i = int(np.abs(grouping.K[:, k]).argmax())
         standard[k] = X[i] / grouping.K[i, k]
     return standard
-
-
-def _found(grouping: BaseParameters, X: Array, root: Array, standard: Array, rows: npt.NDArray[np.bool_]) -> Consistent:
-    """Return parameters with what they are away from the estimate."""
-    base, covariance = grouping.base(standard), root @ root.T
-    off = (base - X)[rows]
-    distance = float(np.linalg.norm(np.linalg.solve(_root(covariance[np.ix_(rows, rows)]), off))) if rows.any() else 0.0
-    departure = (base - X) / np.sqrt(np.diagonal(covariance))
-    return Consistent(grouping.standard.names, standard, base, departure, distance, int(rows.sum()))
 
 
 def _root(covariance: Array) -> Array:
