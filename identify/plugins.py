@@ -40,13 +40,10 @@ class Table(Mapping[str, Callable[[], T]], Generic[T]):
         self.point = point
         self.kind: type[T] = kind
         self._builtin, self._check = builtin, check
+        self.builtin = tuple(builtin)
+        """Names of the parts of this package."""
         self._loaded: dict[str, Callable[[], T]] = {}
         self._objects: dict[str, T] = {}
-
-    @property
-    def builtin(self) -> tuple[str, ...]:
-        """Names of the parts of this package."""
-        return tuple(self._builtin)
 
     def __iter__(self) -> Iterator[str]:
         yield from self._builtin
