@@ -10,7 +10,7 @@ import numpy as np
 from idbench.experiments.errors import ExperimentError
 from idbench.identify import AbstractBlock, Basis, Parameter, ShapedFriction
 from idbench.identify.basis import LoadFriction, TreeLinks
-from idbench.identify.basis.block import RIGID
+from idbench.identify.basis.block import RIGID, AbstractWithoutMomentum
 from idbench.identify.basis.friction.shape import STEP, with_settings
 from idbench.identify.basis.loads import DriveGains, PayloadLink
 from idbench.identify.basis.newton_euler import link_torques
@@ -221,7 +221,7 @@ class RobotFunctions:
 
 
 @dataclass(frozen=True, eq=False)
-class _AboutParameters(AbstractBlock):
+class _AboutParameters(AbstractWithoutMomentum):
     """A block whose columns are slopes at parameters that are symbols."""
 
     block: AbstractBlock
@@ -229,9 +229,6 @@ class _AboutParameters(AbstractBlock):
 
     def parameters(self, n: int) -> tuple[Parameter, ...]:
         return self.block.parameters(n)
-
-    def explicit(self, state: State) -> Any:
-        return self.of.slopes(self.block, state)
 
     def remainder(self, state: State) -> Any:
         return self.of.slopes(self.block, state)

@@ -140,6 +140,15 @@ class AbstractBlock(ABC):
         return {}
 
 
+class AbstractWithoutMomentum(AbstractBlock):
+    """A block without momenta, such as friction or a spring: its torques are those of the remainder."""
+
+    @final
+    def explicit(self, state: State) -> BlockColumns:
+        """Return the remainder."""
+        return self.remainder(state)
+
+
 class AbstractColumns(AbstractBlock):
     """A block that finds its columns in the same way whichever function asks for them."""
 

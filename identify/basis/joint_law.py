@@ -8,14 +8,14 @@ from typing import ClassVar, final
 import numpy as np
 
 from idbench.identify.arrays import Array
-from idbench.identify.basis.block import AbstractBlock, AbstractConservativeBlock, BlockColumns, Kind, Parameter
+from idbench.identify.basis.block import AbstractConservativeBlock, AbstractWithoutMomentum, BlockColumns, Kind, Parameter
 from idbench.identify.basis.symbols import SymbolArray
 from idbench.identify.blame import expect
 from idbench.identify.errors import SettingError
 from idbench.identify.signals.signals import State
 
 
-class AbstractJointLaw(AbstractBlock):
+class AbstractJointLaw(AbstractWithoutMomentum):
     """A law of every joint whose torque stands in the row of the joint alone; a law may have several parameters a joint."""
 
     asks: ClassVar[str] = ""
@@ -33,11 +33,6 @@ class AbstractJointLaw(AbstractBlock):
     def parameters(self, n: int) -> tuple[Parameter, ...]:
         """Return the parameters of each joint."""
         return tuple(Parameter(x, j, *what) for j in range(n) for x, what in self.letters().items())
-
-    @final
-    def explicit(self, state: State) -> BlockColumns:
-        """Return the torques: joint j's parameters in row j."""
-        return self.remainder(state)
 
     @final
     def remainder(self, state: State) -> BlockColumns:

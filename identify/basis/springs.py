@@ -5,13 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from idbench.identify.arrays import Array
-from idbench.identify.basis.block import AbstractConservativeBlock, BlockColumns, Parameter
+from idbench.identify.basis.block import AbstractConservativeBlock, AbstractWithoutMomentum, BlockColumns, Parameter
 from idbench.identify.errors import SettingError, require_finite, require_positive
 from idbench.identify.signals.signals import State
 
 
 @dataclass(frozen=True)
-class Spring(AbstractConservativeBlock):
+class Spring(AbstractWithoutMomentum, AbstractConservativeBlock):
     """Springs of joints, K (q - rest); where the rest position is not known, `offset` takes its torque."""
 
     rest: tuple[float, ...] = (0.0,)
@@ -20,10 +20,6 @@ class Spring(AbstractConservativeBlock):
     def parameters(self, n: int) -> tuple[Parameter, ...]:
         """Return K of each joint."""
         return tuple(map(_stiffness, range(n)))
-
-    def explicit(self, state: State) -> BlockColumns:
-        """Return q - rest."""
-        return self.remainder(state)
 
     def remainder(self, state: State) -> BlockColumns:
         """Return q - rest."""
@@ -44,7 +40,7 @@ def _stiffness(j: int) -> Parameter:
 
 
 @dataclass(frozen=True)
-class Balancer(AbstractConservativeBlock):
+class Balancer(AbstractWithoutMomentum, AbstractConservativeBlock):
     """A balancer of a joint, between a point of its link and one that stands: a spring, and a hydraulic gas spring.
 
     Its length is l = sqrt(a^2 + b^2 - 2 a b cos(q - zero)), a and b the distances of the points from the axis. The spring pulls
@@ -77,10 +73,6 @@ class Balancer(AbstractConservativeBlock):
     def parameters(self, n: int) -> tuple[Parameter, ...]:
         """Return F0 and Kb, and Fg of one with gas."""
         return tuple(map(self._parameter, ("F0", "Kb", *(("Fg",) if self.volume is not None else ()))))
-
-    def explicit(self, state: State) -> BlockColumns:
-        """Return forces times dl/dq."""
-        return self.remainder(state)
 
     def remainder(self, state: State) -> BlockColumns:
         """Return forces times dl/dq."""

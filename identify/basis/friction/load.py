@@ -8,14 +8,14 @@ import numpy as np
 
 from idbench.identify.arrays import Array, combined
 from idbench.identify.basis.basis import Basis
-from idbench.identify.basis.block import RIGID, AbstractBlock, BlockColumns, Kind, Parameter
+from idbench.identify.basis.block import RIGID, AbstractWithoutMomentum, BlockColumns, Kind, Parameter
 from idbench.identify.basis.joint_law import AbstractJointLaw
 from idbench.identify.data.kinematics import Coupling
 from idbench.identify.signals.signals import State
 
 
 @dataclass(frozen=True, eq=False)
-class TiedFriction(AbstractBlock):
+class TiedFriction(AbstractWithoutMomentum):
     """Coulomb friction between joints that one motor drives: each resists as the others turn, Fsx sign(qd6) on joint 5.
 
     In wrists whose gears run through each other: the tied friction of M. Gautier's models of RX and TX robots, as in J. Swevers
@@ -28,10 +28,6 @@ class TiedFriction(AbstractBlock):
     def parameters(self, n: int) -> tuple[Parameter, ...]:
         """Return Fsx."""
         return (self._own,)
-
-    def explicit(self, state: State) -> BlockColumns:
-        """Return the signs of the velocities of the other joints."""
-        return self.remainder(state)
 
     def remainder(self, state: State) -> BlockColumns:
         """Return the signs of the velocities of the other joints."""
