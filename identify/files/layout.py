@@ -135,7 +135,10 @@ class LogLayout:
             raise LogError(f'joints = {joints!r:.60} must be names in quotes, such as joints = ["1", "2"]')
         if twice := sorted({name for name in joints if joints.count(name) > 1}):
             raise LogError(f"joints = {joints!r:.60}: {', '.join(twice)} is given twice; each joint has a name of its own")
-        return cls(**sources, joints=tuple(joints), torque=channel, gain=gains, rows=rows, motors=_regular(matrix))
+        is_square = all(len(row) == len(matrix) for row in matrix)
+        if matrix and (not is_square or abs(np.linalg.det(np.array(matrix))) < SINGULAR):
+            raise LogError(f"[motors]: matrix = {[list(row) for row in matrix]} must be square and have an inverse")
+        return cls(**sources, joints=tuple(joints), torque=channel, gain=gains, rows=rows, motors=matrix)
 
     def where(self, quantity: str, source: Source) -> Self:
         """Return the layout with another source of a quantity: t, q, qd or tau."""
@@ -175,14 +178,6 @@ class LogLayout:
         if self.rows:
             lines += ["", "[rows]", *(f"{json.dumps(name)} = {value!r}" for name, value in self.rows.items())]
         return "\n".join(lines).strip() + "\n"
-
-
-def _regular(matrix: tuple[tuple[float, ...], ...]) -> tuple[tuple[float, ...], ...]:
-    """Return a matrix; raise LogError if it has no inverse."""
-    n = len(matrix)
-    if matrix and (any(len(row) != n for row in matrix) or abs(np.linalg.det(np.array(matrix))) < SINGULAR):
-        raise LogError(f"[motors]: matrix = {[list(row) for row in matrix]} must be square and have an inverse")
-    return matrix
 
 
 def matching(pattern: str, names: Sequence[str]) -> list[tuple[str, str]]:
