@@ -53,8 +53,6 @@ KINDS: dict[str, tuple[Kind, str]] = {
 }
 """What the inertial parameters measure, and their units."""
 
-NOTHING: Matrix = (ZERO, ZERO, ZERO)
-
 
 class Wrench(NamedTuple):
     """Force M a + A MS and moment J (XX ... ZZ) + MS x a of a link with mass M and first moments MS."""
@@ -106,7 +104,7 @@ class Wrench(NamedTuple):
     @classmethod
     def weight(cls, up: Vector) -> Self:
         """Acceleration that holds a link against gravity: a = -g."""
-        return cls(up, NOTHING, (ZERO,) * 6)
+        return cls(up, (ZERO, ZERO, ZERO), (ZERO,) * 6)
 
     def along(self, twist: Twist, parameter: int) -> Term:
         """Power of a parameter's force and moment along a unit motion, by its number in INERTIAL."""
