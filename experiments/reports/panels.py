@@ -1,4 +1,4 @@
-"""Curves as SVG that stands in a page: panels with axes, lines, dots and intervals, drawn without another package."""
+"""Curves as SVG that stands in a page: panels with axes, lines and dots, drawn without another package."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
@@ -29,17 +29,11 @@ class PanelAxis:
 
     log: bool = False
     """Whether it is logarithmic."""
-    linear: float = 0.0
-    """Size below which a logarithmic axis with both signs is linear; 0: there is none."""
     limits: tuple[float, float] | None = None
     """Its ends; those of the data by default."""
-    ticks: dict[float, str] | None = None
-    """Numbers or names on it; round numbers by default."""
 
     def scaled(self, x: Array) -> Array:
         """Places of values on an even axis."""
-        if self.linear:
-            return np.asarray(np.sign(x) * np.log10(1 + np.abs(x) / self.linear))
         return np.log10(np.maximum(x, 1e-300)) if self.log else np.asarray(x, dtype=np.float64)
 
     def ends(self, every: Sequence[Array]) -> tuple[float, float]:
@@ -55,9 +49,7 @@ class PanelAxis:
         return (low, high) if self.log else (low - room, high + room)
 
     def numbers(self, low: float, high: float) -> dict[float, str]:
-        """Ticks and their texts."""
-        if self.ticks is not None:
-            return {x: text for x, text in self.ticks.items() if low <= x <= high}
+        """Round numbers on it, and their texts."""
         if self.log:
             return {x: f"{x:g}" for x in decade_values(low, high).tolist()}
         return {x: f"{x:.6g}" for x in round_values(low, high).tolist()}
@@ -78,25 +70,11 @@ class Panel:
 
     def line(self, x: Array, y: Array, color: str, width: float = 1.0, label: str = "", dash: str = "") -> None:
         """Draw a curve, interrupted where it is NaN."""
-        self.drawn.append(
-            (f"line {dash}", np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64), color, width, label)
-        )
+        self.drawn.append((f"line {dash}", x, y, color, width, label))
 
     def dots(self, x: Array, y: Array, color: str, radius: float = 1.5, label: str = "") -> None:
         """Draw dots."""
-        self.drawn.append(("dots", np.asarray(x, np.float64), np.asarray(y, np.float64), color, radius, label))
-
-    def intervals(self, x: Array, y: Array, half: Array, color: str, label: str = "") -> None:
-        """Draw dots with intervals."""
-        for a, low, high in zip(x, y - half, y + half, strict=True):
-            self.line(np.array([a, a]), np.array([low, high]), color, 1.2)
-        self.dots(x, y, color, 2.2, label)
-
-    def across(self, x: Array, y: Array, color: str, label: str = "") -> None:
-        """Draw short level lines."""
-        for a, b in zip(x, y, strict=True):
-            self.line(np.array([a - 0.35, a + 0.35]), np.array([b, b]), color, 1.2, label)
-            label = ""
+        self.drawn.append(("dots", x, y, color, radius, label))
 
 
 def figure(panels: Sequence[Panel], height: float, x: str = "", y: str = "") -> str:
@@ -141,10 +119,8 @@ def stacked(panels: Sequence[Panel], height: float, x: str = "", y: str = "") ->
 
 def _all(panels: Sequence[Panel], height: float, wide: float) -> tuple[tuple[float, float], list[str]]:
     """Return the size of each panel [px], and their elements."""
-    upright = any(panel.x.ticks and len(panel.x.ticks) > UPRIGHT for panel in panels)
     inner = wide - LEFT - RIGHT, height * ROW - ABOVE
-    drawn = ["\n".join(_panel(panel, (LEFT, TOP), inner, upright)) for panel in panels]
-    return (wide, TOP + inner[1] + BOTTOM + (NAMES if upright else 0)), drawn
+    return (wide, TOP + inner[1] + BOTTOM), ["\n".join(_panel(panel, *inner)) for panel in panels]
 
 
 def _axes(x: str, y: str) -> str:
@@ -160,45 +136,39 @@ HEAD = 20.0  # Room for the legend of a picture [px]
 
 SVG = "http://www.w3.org/2000/svg"
 
-UPRIGHT, NAMES = 18, 30.0  # Names of an axis from which on they stand upright, and their room [px]
+
+def _text(x: float, y: float, text: str, anchor: str = "start") -> str:
+    return f'<text x="{x:.0f}" y="{y:.0f}" text-anchor="{anchor}">{escape(text)}</text>' if text else ""
 
 
-def _text(x: float, y: float, text: str, anchor: str = "start", more: str = "") -> str:
-    return f'<text x="{x:.0f}" y="{y:.0f}" text-anchor="{anchor}"{more}>{escape(text)}</text>' if text else ""
-
-
-def _panel(panel: Panel, at: tuple[float, float], size: tuple[float, float], upright: bool) -> Iterator[str]:
-    """Yield the elements of a panel."""
-    (left, top), (wide, high) = at, size
+def _panel(panel: Panel, wide: float, high: float) -> Iterator[str]:
+    """Yield the elements of a panel, its inner size given [px]."""
     low_x, high_x = panel.x.ends([x for _, x, *_ in panel.drawn])
     low_y, high_y = panel.y.ends([y for _, _, y, *_ in panel.drawn])
     begin_x, end_x = panel.x.scaled(np.array([low_x, high_x]))
     begin_y, end_y = panel.y.scaled(np.array([low_y, high_y]))
 
     def place_x(x: Array) -> Array:
-        return np.asarray(left + wide * (panel.x.scaled(x) - begin_x) / ((end_x - begin_x) or 1.0))
+        return np.asarray(LEFT + wide * (panel.x.scaled(x) - begin_x) / ((end_x - begin_x) or 1.0))
 
     def place_y(y: Array) -> Array:
         share = (panel.y.scaled(y) - begin_y) / ((end_y - begin_y) or 1.0)
-        return np.clip(top + high * (1 - share), top - high, top + 2 * high)
+        return np.clip(TOP + high * (1 - share), TOP - high, TOP + 2 * high)
 
     box = f'width="{wide:.0f}" height="{high:.0f}"'
-    yield f'<svg x="{left:.0f}" y="{top:.0f}" {box} viewBox="{left:.0f} {top:.0f} {wide:.0f} {high:.0f}">'
+    yield f'<svg x="{LEFT:.0f}" y="{TOP:.0f}" {box} viewBox="{LEFT:.0f} {TOP:.0f} {wide:.0f} {high:.0f}">'
     for value in panel.y.numbers(low_y, high_y):
         level = float(place_y(np.array([value]))[0])
-        yield f'<path d="M{left:.0f},{level:.1f}h{wide:.0f}" stroke="#e4e4e4"/>'
+        yield f'<path d="M{LEFT:.0f},{level:.1f}h{wide:.0f}" stroke="#e4e4e4"/>'
     for kind, x, y, color, width, _ in panel.drawn:
         yield from _drawn(kind, place_x(x), place_y(y), color, width, int(wide) * FINE)
     yield "</svg>"
-    yield f'<rect x="{left:.0f}" y="{top:.0f}" {box} fill="none" stroke="#888"/>'
-    yield _text(left, top - 5, panel.title)
+    yield f'<rect x="{LEFT:.0f}" y="{TOP:.0f}" {box} fill="none" stroke="#888"/>'
+    yield _text(LEFT, TOP - 5, panel.title)
     for value, text in panel.y.numbers(low_y, high_y).items():
-        yield _text(left - 4, float(place_y(np.array([value]))[0]) + 3, text, "end")
-    below = top + high + (5 if upright else 13)
+        yield _text(LEFT - 4, float(place_y(np.array([value]))[0]) + 3, text, "end")
     for value, text in panel.x.numbers(low_x, high_x).items():
-        across = float(place_x(np.array([value]))[0]) + (3 if upright else 0)
-        turned = f' transform="rotate(-90 {across:.0f} {below:.0f})"' if upright else ""
-        yield _text(across, below, text, "end" if upright else "middle", turned)
+        yield _text(float(place_x(np.array([value]))[0]), TOP + high + 13, text, "middle")
 
 
 def _drawn(kind: str, x: Array, y: Array, color: str, width: float, columns: int) -> Iterator[str]:
