@@ -1,7 +1,7 @@
 """Charts of the residuals of an identification: over velocity and position, with the friction laws, and its spectrum."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass
 from math import ceil
 
 import numpy as np
@@ -156,7 +156,8 @@ class ResidualCharts:
         """
         force, way = self.fit.robot_model.units(j)
         if kind == "over_velocity":
-            points = {form: FrictionCurves(self.fit, self.fit.estimates[form].X).residual(j) for form in left}
+            rows = {form: FrictionCurves(self.fit, self.fit.estimates[form].X).rows(j) for form in left}
+            points = {form: (v, residual, weight) for form, (v, residual, _, weight) in rows.items()}
         else:
             points = {f: (x.equations.signals.state.q[j, x.inner], x.residual[j], x.weight[j]) for f, x in left.items()}
         seen, residual, weight = next(iter(points.values()))
@@ -187,15 +188,15 @@ class ResidualCharts:
         if self.fit.truth is not None:
             found["true"] = np.array(list(self.fit.truth.values()))
         curves = {name: FrictionCurves(self.fit, X) for name, X in found.items()}
-        dots = curves[next(iter(left))].measured(j)
+        v, _, torque, weight = curves[next(iter(left))].rows(j)
         laws = {name: list(each.laws(j)) for name, each in curves.items()}
         every = [curve for each in laws.values() for curve in each]
-        y = linear(f"friction of {self.joints[j]} [{force}]", _around(np.concatenate([curve.torque for curve in every])))
-        x = linear(f"qd [{way}/s]", every[0].v)
+        y = linear(f"friction of {self.joints[j]} [{force}]", _around(np.concatenate([friction for _, friction in every])))
+        x = linear(f"qd [{way}/s]", every[0][0])
         chart = Chart(self.stream, f"{self.at}/friction/{self.joints[j]}", x, y, NARROW)
-        self._dots(chart, *dots, GREY)
+        self._dots(chart, v, torque, weight, GREY)
         for name, each in laws.items():
-            v, torque = (np.concatenate([np.append(x, np.nan) for x in xs]) for xs in zip(*map(astuple, each), strict=True))
+            v, torque = (np.concatenate([np.append(x, np.nan) for x in xs]) for xs in zip(*each, strict=True))
             chart.line(name, v, torque, self._color(name), 2.5 if name == "explicit" else 1.2)
 
     def _spectrum(self, found: Spectrum) -> None:

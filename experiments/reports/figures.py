@@ -96,15 +96,15 @@ def friction_figure(fit: Fit) -> str:
         return ""
     curves, panels = FrictionCurves(fit, estimate.X), list[Panel]()
     for j, joint in enumerate(fit.robot_model.robot.joints):
-        v, torque, weight = curves.measured(j)
+        v, _, torque, weight = curves.rows(j)
         v, torque = v[weight > WHOLE], torque[weight > WHOLE]
         panel = Panel(f"{joint}: {' + '.join(fit.robot_model.laws.names[j])}")
         panel.dots(v, torque, "#999999", 1.0, "torque minus that of the links")
-        for number, line in enumerate(curves.laws(j)):
-            inside = (line.v >= v.min(initial=0.0)) & (line.v <= v.max(initial=0.0))
+        for number, (speeds, friction) in enumerate(curves.laws(j)):
+            inside = (speeds >= v.min(initial=0.0)) & (speeds <= v.max(initial=0.0))
             labels = ("", "") if number else ("estimated law", "beyond the speeds of the log")
-            panel.line(line.v, np.where(inside, line.torque, np.nan), color_of("explicit"), 1.6, labels[0])
-            panel.line(line.v, np.where(inside, np.nan, line.torque), color_of("power"), 1.6, labels[1], "2 3")
+            panel.line(speeds, np.where(inside, friction, np.nan), color_of("explicit"), 1.6, labels[0])
+            panel.line(speeds, np.where(inside, np.nan, friction), color_of("power"), 1.6, labels[1], "2 3")
         panels.append(panel)
     force, velocity = _units(fit)
     return figure(panels, 1.6, f"velocity [{velocity}]", f"friction [{force}]")

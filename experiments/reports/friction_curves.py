@@ -83,16 +83,6 @@ POINTS = 201  # Of a curve to either side
 LOADS = (0.05, 0.95)  # Quantiles of the load at which a law that grows with it is drawn
 
 
-@dataclass(frozen=True)
-class Curve:
-    """A law over velocity."""
-
-    v: Array
-    """Velocity [rad/s], shape (point,)."""
-    torque: Array
-    """Friction [N m], shape (point,)."""
-
-
 @dataclass(frozen=True, eq=False)
 class FrictionCurves:
     """The friction of the joints of an identification."""
@@ -102,23 +92,18 @@ class FrictionCurves:
     X: Array
     """The parameters of one of its estimates, shape (p,)."""
 
-    def measured(self, j: int) -> tuple[Array, Array, Array]:
-        """Return velocities of a joint, its torque less the rigid body's, and the weights of the mask, shape (row,) each."""
-        v, left, law, weight = self._joined(j)
-        return v, left + law, weight
+    def rows(self, j: int) -> tuple[Array, Array, Array, Array]:
+        """Return, of a joint, what its rows have, shape (row,) each.
 
-    def residual(self, j: int) -> tuple[Array, Array, Array]:
-        """Return velocities of a joint, the residual torque in the band of the fit, and the weights, shape (row,) each."""
-        v, left, _, weight = self._joined(j)
-        return v, left, weight
-
-    def _joined(self, j: int) -> tuple[Array, Array, Array, Array]:
-        v, left, law, weight = (np.concatenate(x) for x in zip(*((x[j] for x in part) for part in self._rows), strict=True))
-        return v, left, law, weight
+        Velocities, the residual torque in the band of the fit, the torque less that of the rigid body, and the weights of the
+        mask.
+        """
+        v, left, torque, weight = (np.concatenate(x) for x in zip(*((x[j] for x in part) for part in self._rows), strict=True))
+        return v, left, torque, weight
 
     @cached_property
     def _rows(self) -> list[tuple[Array, Array, Array, Array]]:
-        """Velocity, residual, law and weight of all joints, log by log, shape (joint, row) each."""
+        """What `rows` gives of all joints, log by log, shape (joint, row) each."""
         found, (laws, X) = [], self._laws
         for part in self.fit.problem.parts:
             rows, signals = part.rows, part.signals
@@ -126,19 +111,19 @@ class FrictionCurves:
             residual = rows.Y - rows.predicted(self.X)
             left = np.stack([residual[rows.group == j] for j in range(self.fit.basis.n)])
             qd, chain = filtered(signals, self.fit.processing)["qd"], self.fit.processing
-            found.append((qd, left, _rows_of(signals, chain, friction), _rows_of(signals, chain, signals.weight)))
+            found.append((qd, left, left + _rows_of(signals, chain, friction), _rows_of(signals, chain, signals.weight)))
         return found
 
-    def laws(self, j: int) -> Iterator[Curve]:
-        """Yield the law of a joint over velocity, with each of some loads where it depends on that."""
-        v, _, weight = self.measured(j)
+    def laws(self, j: int) -> Iterator[tuple[Array, Array]]:
+        """Yield the law of a joint, with each of some loads where it depends on that: velocity [rad/s], friction [N m]."""
+        v, *_, weight = self.rows(j)
         fastest = BEYOND * max(np.abs(v[weight > WHOLE]).max(initial=0.0), 1e-3)
         side = np.linspace(0, fastest, POINTS)[1:]
         v = np.concatenate([-side[::-1], [0.0], side])
         for load in self._loads(j):
             torque = self._at(j, v, load)
             torque[POINTS - 1] = np.nan  # where friction jumps
-            yield Curve(v, torque)
+            yield v, torque
 
     def _at(self, j: int, v: Array, load: float) -> Array:
         """Return the law of a joint at velocities, in the middle of its positions, under a load."""
