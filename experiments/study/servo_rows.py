@@ -1,8 +1,8 @@
 """What a study of servos finds: parameters of every joint, from commands and positions alone."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from functools import cache, partial
-from typing import Any, NamedTuple
+from functools import cache
+from typing import Any
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from idbench.experiments.study.statistics import BOUNDS
 from idbench.identify import MotionLog
 from idbench.identify.basis.block import named
 from idbench.identify.files.servo_log import ServoColumns
-from idbench.identify.servo import ServoFit, ServoRun, identify_servo, parameters_of
+from idbench.identify.servo import ServoFit, identify_servo, parameters_of
 from idbench.identify.servo.fit import TORQUES
 from idbench.sim.drives import ServoDrive
 from idbench.sim.engine.run import Run
@@ -25,27 +25,15 @@ from idbench.sim.settings import per_joint
 SERVO = "servo"  # Name of the model in results
 
 
-class StudiedLaw(NamedTuple):
-    """A law of friction, and what else is found, as `load+lead` states it."""
-
-    friction: str
-    more: tuple[str, ...]
-
-    @property
-    def letters(self) -> tuple[str, ...]:
-        """Parameters of a joint."""
-        return parameters_of(self.friction, self.more)
-
-
-def law_of(text: str) -> StudiedLaw:
-    """Return the law that a text states."""
+def law_of(text: str) -> tuple[str, tuple[str, ...]]:
+    """Return a law of friction, and what else is found, as `load+lead` states it."""
     friction, *more = text.split("+")
-    return StudiedLaw(friction, tuple(more))
+    return friction, tuple(more)
 
 
 def names_of(scenario: Scenario, laws: Sequence[str]) -> tuple[str, ...]:
     """Return the parameters of all joints with any of the laws."""
-    letters = dict.fromkeys(x for text in laws for x in law_of(text).letters)
+    letters = dict.fromkeys(x for text in laws for x in parameters_of(*law_of(text)))
     return tuple(named(x, j) for j in range(scenario.real_robot.n) for x in letters)
 
 
@@ -74,7 +62,7 @@ def servo_columns(law: str, simulated: Run, i: int) -> dict[str, float] | str:
     truth = truth_of(simulated.scenario)
     found, why = dict[str, float](), list[str]()
     joints = _joints(simulated.scenario, simulated.log.run((i,)))
-    for j, fit in dict(joints.identified(partial(_identified, law))).items():
+    for j, fit in dict(joints.identified(lambda _, runs: identify_servo(runs, *law_of(law)))).items():
         if not isinstance(fit, ServoFit):
             why.append(str(fit))
             continue
@@ -85,10 +73,6 @@ def servo_columns(law: str, simulated: Run, i: int) -> dict[str, float] | str:
             found |= {at: fit.p[name], f"{at}.sigma": sigma, f"{at}.paper_sigma": bound, f"{at}.truth": truth.get(at, np.nan)}
             found |= dict.fromkeys((at + part for part in BOUNDS), bound)
     return found or "; ".join(why)
-
-
-def _identified(law: str, _joint: int, runs: Sequence[ServoRun]) -> ServoFit:
-    return identify_servo(runs, *law_of(law))
 
 
 def rows_of(
