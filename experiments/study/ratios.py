@@ -1,7 +1,6 @@
 """Ratios of the errors of models, on the same runs."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, TypeAlias
 
@@ -32,52 +31,39 @@ RatioRow: TypeAlias = Mapping[str, Any]
 """A ratio as `summary.json` of the study has it."""
 
 
-@dataclass(frozen=True, eq=False)
-class Ratio:
-    """The typical error of a cell over that of another, on the runs that both identified."""
-
-    cell: Cell
-    """The one above."""
-    base: Cell
-    """The one below."""
-    value: float
-    """Ratio of the geometric means, over the parameters, of the rms over the runs."""
-    low: float
-    """Lower end of its confidence interval, by the bootstrap over runs."""
-    high: float
-    """Upper end."""
-    runs: int
-    """Runs that both identified."""
-
-    @property
-    def pair(self) -> str:
-        """Names of both models."""
-        return f"{self.cell.names[2]} / {self.base.names[2]}"
-
-    def __str__(self) -> str:
-        return interval({"ratio": self.value, "low": self.low, "high": self.high})
-
-
 @lru_cache(maxsize=4096)
-def ratio(cell: Cell, base: Cell) -> Ratio:
-    """Return the ratio of the typical errors of two cells, NaN if no run has both; the same at every call."""
+def ratio(cell: Cell, base: Cell) -> RatioRow:
+    """Return the ratio of the typical errors of two cells on the runs that both identified; the same at every call.
+
+    Geometric means, over the parameters, of the rms over the runs are divided; the confidence interval is by the bootstrap over
+    runs. NaN if no run has both.
+    """
     _, mine, theirs = np.intersect1d(cell.run, base.run, return_indices=True)
-    if not len(mine):
-        return Ratio(cell, base, np.nan, np.nan, np.nan, 0)
-    known = cell.relative & base.relative
-    squares = [each.error[index][:, known] ** 2 for each, index in ((cell, mine), (base, theirs))]
-    counts = np.random.default_rng(0).multinomial(len(mine), np.full(len(mine), 1 / len(mine)), size=DRAWS) / len(mine)
-    # A product by einsum: its bits do not depend on the number of threads.
-    drawn, whole = (
-        np.subtract(*(ln_typical(np.einsum("...r,rp->...p", share, x)) for x in squares))
-        for share in (counts, np.full(len(mine), 1 / len(mine)))
-    )
-    low, high = np.exp(np.quantile(drawn, [(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2]))
-    return Ratio(cell, base, float(np.exp(whole)), float(low), float(high), len(mine))
+    whole = low = high = np.nan
+    if len(mine):
+        known = cell.relative & base.relative
+        squares = [each.error[index][:, known] ** 2 for each, index in ((cell, mine), (base, theirs))]
+        counts = np.random.default_rng(0).multinomial(len(mine), np.full(len(mine), 1 / len(mine)), size=DRAWS) / len(mine)
+        # A product by einsum: its bits do not depend on the number of threads.
+        drawn, whole = (
+            np.subtract(*(ln_typical(np.einsum("...r,rp->...p", share, x)) for x in squares))
+            for share in (counts, np.full(len(mine), 1 / len(mine)))
+        )
+        low, high = np.exp(np.quantile(drawn, [(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2]))
+    return {
+        "settings": dict(cell.settings),
+        "chain": cell.names[0],
+        "estimator": cell.names[1],
+        "models": [cell.names[2], base.names[2]],
+        "ratio": float(np.exp(whole)),
+        "low": float(low),
+        "high": float(high),
+        "runs": len(mine),
+    }
 
 
-def ratios(cells: Sequence[Cell]) -> Iterator[Ratio]:
-    """Yield the ratios of `PAIRS` of cells that differ in their model alone."""
+def ratios(cells: Sequence[Cell]) -> Iterator[tuple[Cell, RatioRow]]:
+    """Yield the ratios of `PAIRS` of cells that differ in their model alone, each behind the cell whose errors are divided."""
     groups: dict[tuple[Any, ...], dict[str, Cell]] = {}
     for cell in cells:
         if cell.runs:
@@ -85,36 +71,19 @@ def ratios(cells: Sequence[Cell]) -> Iterator[Ratio]:
     for group in groups.values():
         for above, below in PAIRS:
             if above in group and below in group:
-                yield ratio(group[above], group[below])
+                yield group[above], ratio(group[above], group[below])
 
 
-def ratios_table(found: Sequence[Ratio]) -> Any:
+def ratios_table(found: Sequence[tuple[Cell, RatioRow]]) -> Any:
     """Return the ratios as a table: a line for each way of identification, a column for each pair of models."""
-    pairs = list(dict.fromkeys(each.pair for each in found))
+    pairs = list(dict.fromkeys(pair_of(row) for _, row in found))
     lines: dict[tuple[str, ...], dict[str, str]] = {}
-    for each in found:
-        lines.setdefault((combination(each.cell), *each.cell.names[:2]), {})[each.pair] = str(each)
+    for cell, row in found:
+        lines.setdefault((combination(cell), *cell.names[:2]), {})[pair_of(row)] = interval(row)
     grid = new_table("ratios of typical errors, with 95 % confidence intervals", ["chain", "estimator", *pairs])
-    for (settings, chain, estimator), row in lines.items():
-        grid.add_row(settings, chain, estimator, *(row.get(pair, "") for pair in pairs))
+    for names, cells in lines.items():
+        grid.add_row(*names, *(cells.get(pair, "") for pair in pairs))
     return grid
-
-
-def ratios_summary(found: Sequence[Ratio]) -> list[RatioRow]:
-    """Return the ratios as summary.json has them."""
-    return [
-        {
-            "settings": dict(each.cell.settings),
-            "chain": each.cell.names[0],
-            "estimator": each.cell.names[1],
-            "models": [each.cell.names[2], each.base.names[2]],
-            "ratio": each.value,
-            "low": each.low,
-            "high": each.high,
-            "runs": each.runs,
-        }
-        for each in found
-    ]
 
 
 def conclusion(found: Sequence[RatioRow]) -> str:
@@ -149,6 +118,11 @@ def _of(found: Sequence[RatioRow], pair: list[str], **given: str) -> list[RatioR
 def _span(rows: Sequence[RatioRow]) -> str:
     low, high = (pick(row["ratio"] for row in rows) for pick in (min, max))
     return f"{low:.2g} to {high:.2g}"
+
+
+def pair_of(row: RatioRow) -> str:
+    """Return the names of both models."""
+    return " / ".join(row["models"])
 
 
 def interval(row: RatioRow) -> str:

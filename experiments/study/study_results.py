@@ -32,7 +32,7 @@ from idbench.experiments.study.axis import FRICTION, Axis
 from idbench.experiments.study.cluster import versions
 from idbench.experiments.study.comparison import differences
 from idbench.experiments.study.figures import bars_figure, cost_figure, coverage_figure, error_figure, typical_figure
-from idbench.experiments.study.ratios import conclusion, ratios, ratios_summary, ratios_table
+from idbench.experiments.study.ratios import conclusion, interval, pair_of, ratios, ratios_table
 from idbench.experiments.study.statistics import BOUNDS, Cell, cells
 from idbench.experiments.study.store import Store, arrays
 from idbench.experiments.study.study import Study
@@ -61,7 +61,9 @@ def report(study: Study, cells: Sequence[Cell], seconds: dict[str, float], folde
         overview=[_overview(cell) for cell in cells],
         families=[_family(title, group, main_axis(study)) for title, group in families(study, solved)],
         bars=[(title, bars_figure(group)) for title, group in _comparisons(study, solved)],
-        ratios=[[where(r.cell, cells), r.pair, str(r), f"{r.runs}"] for r in ratios(solved)] if study.rows == "equal" else [],
+        ratios=[[where(cell, cells), pair_of(row), interval(row), f"{row['runs']}"] for cell, row in ratios(solved)]
+        if study.rows == "equal"
+        else [],
         differences=[] if _compares(study) else list(_differences(solved)),
         details=[row for cell in solved for row in _details(cell, where(cell, cells))],
         failed=[
@@ -80,7 +82,7 @@ def study_answer(study: Study, found: Sequence[Cell]) -> str:
     """Return the answer of a study: the ratios of the models' errors, or which method errs least."""
     if not (_compares(study) and any(cell.runs for cell in found)):
         return answer(found, study.edges)
-    return " ".join(filter(None, [conclusion(ratios_summary(list(ratios(found)))), failures(found)])) or answer(found)
+    return " ".join(filter(None, [conclusion([row for _, row in ratios(found)]), failures(found)])) or answer(found)
 
 
 def _compares(study: Study) -> bool:
@@ -227,7 +229,7 @@ def summary_of(study: Study, found: Sequence[Cell], seconds: dict[str, float]) -
         "answer": study_answer(study, found),
         "parameters": list(study.parameters),
         "cells": [_cell(cell) for cell in found],
-        **({"ratios": ratios_summary(list(ratios(found)))} if study.rows == "equal" else {}),
+        **({"ratios": [row for _, row in ratios(found)]} if study.rows == "equal" else {}),
         "seconds": {**seconds, "runs": study.size},
     }
 

@@ -126,8 +126,8 @@ def test_a_ratio_of_known_errors_lies_in_its_interval():
     for _ in range(60):
         one, other = (cell(name, 1 + size * rng.standard_normal(200)) for name, size in (("power", 0.3), ("explicit", 0.1)))
         found = ratio(one, other)
-        assert found.low < found.value < found.high
-        inside += found.low <= 3.0 <= found.high
+        assert found["low"] < found["ratio"] < found["high"]
+        inside += found["low"] <= 3.0 <= found["high"]
     assert inside >= 50  # of 60, 57 are expected, with a standard deviation of 1.7
 
 
