@@ -9,7 +9,7 @@ import numpy as np
 
 from idbench.experiments.identification.causes import Cause
 from idbench.experiments.identification.fit import Fit
-from idbench.experiments.judgement.held_out import FAIR, GOOD, Verdict
+from idbench.experiments.judgement.held_out import FAIR, GOOD, HeldOut, Verdict
 from idbench.experiments.judgement.judgement import Judgement
 from idbench.experiments.judgement.warnings import DELAY, FLAGS, LOG, doubtful, used
 from idbench.experiments.note import noted
@@ -169,6 +169,14 @@ def verdict_on(judgement: Judgement) -> Verdict | None:
     """Return the verdict on the leading model on the hardest held-out log; None if there is no such log."""
     one = judgement.hardest
     return None if one is None else one.verdicts[one.fit.leading]
+
+
+def alike(one: HeldOut) -> dict[tuple[str, str], list[str]]:
+    """Return the verdicts on a held-out log, word and reasons, with the models that have them."""
+    found: dict[tuple[str, str], list[str]] = {}
+    for model, verdict in one.verdicts.items():
+        found.setdefault((verdict.word, "; ".join(verdict.reasons)), []).append(model)
+    return found
 
 
 def _found(judgement: Judgement, causes: Sequence[Cause]) -> str:

@@ -1,11 +1,11 @@
 """The report of an identification: one HTML file that needs no other."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from datetime import date
 from importlib.metadata import version
 from itertools import groupby
 from math import isfinite
+from operator import itemgetter
 from typing import Any, TypeVar
 
 import numpy as np
@@ -13,8 +13,8 @@ import numpy as np
 from idbench.experiments.identification.fit import Fit
 from idbench.experiments.judgement.held_out import HeldOut
 from idbench.experiments.judgement.judgement import Judgement, Unjudged
-from idbench.experiments.judgement.warnings import FLAGS, WEAK, doubtful, used
-from idbench.experiments.reports.estimates import verdict_on
+from idbench.experiments.judgement.warnings import WEAK, doubtful
+from idbench.experiments.reports.estimates import EstimatesTable, alike, verdict_on
 from idbench.experiments.reports.figures import (
     causes_figure,
     color_of,
@@ -35,30 +35,8 @@ WIDE, HIGH = 220.0, 14.0  # Size of an interval's picture [px]
 ROUNDING = 1e-12  # Value of a file's parameter that is rounding of 0: those that are grouped are sums of products
 
 
-@dataclass(frozen=True)
-class ParameterRow:
-    """A parameter in the table of a report."""
-
-    name: str
-    """What it is called."""
-    value: str
-    """Value with its standard error, and marks."""
-    unit: str
-    """Of the value."""
-    percent: str
-    """Standard error [%]."""
-    filed: str
-    """What the robot's file says, or the truth if that is known; empty if neither says it."""
-    interval: str
-    """The 95 % intervals of all models as SVG."""
-    made_of: str
-    """The standard parameters that are grouped in it; empty if it is one."""
-    link: str
-    """The joint that it belongs to."""
-
-
-def parameter_rows(fit: Fit) -> Iterator[ParameterRow]:
-    """Yield the parameters, by link."""
+def parameter_rows(fit: Fit) -> Iterator[dict[str, str]]:
+    """Yield the parameters by link, as the table of the page names their cells."""
     lead, marks = fit.estimates[fit.leading], doubtful(fit)[fit.leading]
     filed_values = fit.robot_model.truth(fit.robot_model.robot)  # 0 is what files say of what they do not state, too
     stated = fit.truth or {name: x for name, x in filed_values.items() if abs(x) > ROUNDING}
@@ -68,16 +46,16 @@ def parameter_rows(fit: Fit) -> Iterator[ParameterRow]:
         parameter = fit.basis.parameters[i]
         x, sigma = float(lead.X[i]), float(lead.standard_errors[i])
         filed = stated.get(parameter.name)
-        yield ParameterRow(
-            parameter.name,
-            f"{concise(x, sigma)}{''.join(marks[i]).strip()}",
-            parameter.unit,
-            relative(x, sigma),
-            "" if filed is None else f"{filed:.4g}",
-            _interval(fit, i, filed, reach),
-            "" if made.get(parameter.name) == parameter.name else made.get(parameter.name, ""),
-            joints[parameter.joint] if parameter.joint is not None else "",
-        )
+        yield {
+            "name": parameter.name,
+            "value": f"{concise(x, sigma)}{''.join(marks[i]).strip()}",
+            "unit": parameter.unit,
+            "percent": relative(x, sigma),
+            "filed": "" if filed is None else f"{filed:.4g}",  # or the truth if that is known; empty if neither says it
+            "interval": _interval(fit, i, filed, reach),
+            "made_of": "" if made.get(parameter.name) == parameter.name else made.get(parameter.name, ""),
+            "link": joints[parameter.joint] if parameter.joint is not None else "",
+        }
 
 
 def interval_reach(fit: Fit) -> float:
@@ -171,14 +149,14 @@ def _of_judgement(judgement: Judgement, answer: tuple[str, str], attempts: Attem
 
 def _of_estimates(fit: Fit) -> dict[str, Any]:
     """Return the table of parameters, and what limits them."""
-    lead, marks = fit.estimates[fit.leading], doubtful(fit)[fit.leading]
+    lead = fit.estimates[fit.leading]
     return {
         "models": [(model, color_of(model)) for model in fit.estimates],
         "leading": fit.leading,
         "filed": "true value" if fit.truth else "robot's file",
         "reach": f"{interval_reach(fit):.2g}",
-        "parameters": [(link, list(rows)) for link, rows in groupby(parameter_rows(fit), lambda row: row.link)],
-        "legend": "; ".join(f"{flag} {FLAGS[flag]}" for flag in used({fit.leading: marks})),
+        "parameters": [(link, list(rows)) for link, rows in groupby(parameter_rows(fit), itemgetter("link"))],
+        "legend": EstimatesTable(fit, (fit.leading,)).legend,
         "correlated": correlated(lead)[:LONGEST],
         "limits": [(cause, percentage(share), name, percentage(most)) for cause, share, name, most in error_shares(lead)],
     }
@@ -190,10 +168,7 @@ def _figure(attempts: Attempts, name: str, draw: Callable[[T], str], shown: T) -
 
 
 def _verdicts(one: HeldOut) -> Iterator[tuple[str, str, str]]:
-    alike: dict[tuple[str, str], list[str]] = {}
-    for model, verdict in one.verdicts.items():
-        alike.setdefault((verdict.word, "; ".join(verdict.reasons)), []).append(model)
-    for (word, reasons), models in alike.items():
+    for (word, reasons), models in alike(one).items():
         yield f"{' and '.join(models)} model{'s' if len(models) > 1 else ''}", word, reasons
 
 

@@ -1,6 +1,6 @@
 """Held-out logs as text."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from math import isfinite
 
 import numpy as np
@@ -9,6 +9,7 @@ from rich.text import Text
 
 from idbench.experiments.judgement.held_out import WORDS, HeldOut
 from idbench.experiments.judgement.judgement import Unjudged
+from idbench.experiments.reports.estimates import alike
 from idbench.experiments.text import error_percentage, new_table, percentage, print_titled
 from idbench.identify import Array
 from idbench.identify.judge.torque_interval import LEVEL, MOST
@@ -68,9 +69,9 @@ def _details_of(one: HeldOut, standing: Array) -> Iterator[str]:
     each = zip(joints, standing, units, strict=True)
     if apart := [f"{joint} {rms:.2g} {unit}" for joint, rms, unit in each if isfinite(rms)]:
         yield f"at rest and reversing, where friction is not determined: {', '.join(apart)}"
-    for words, (model, *others) in _alike({model: (v.word, *v.reasons) for model, v in one.verdicts.items()}).items():
+    for (word, reasons), (model, *others) in alike(one).items():
         same = f" ({', '.join(others)}: the same)" if others else ""
-        yield f"{model}: {words[0]}: {'; '.join(words[1:])}{same}"
+        yield f"{model}: {word}: {reasons}{same}"
     for model, why in one.fit.failures.items():
         yield f"{model}: not judged: {why}"
 
@@ -90,14 +91,6 @@ def _interval_words(one: HeldOut, model: str, inside: Array, outside: float) -> 
     )
     beyond = f"{100 * outside:.0f} % of the motion is outside the fitted speeds and torques, where no interval holds"
     return f"{words}; {beyond}" if outside > 2 * expected else words
-
-
-def _alike(verdicts: Mapping[str, tuple[str, ...]]) -> dict[tuple[str, ...], list[str]]:
-    """Return verdicts with the models that have them."""
-    found: dict[tuple[str, ...], list[str]] = {}
-    for model, words in verdicts.items():
-        found.setdefault(words, []).append(model)
-    return found
 
 
 def _held_out_cells(one: HeldOut, model: str, j: int) -> tuple[str, str, str]:
