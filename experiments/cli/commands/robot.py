@@ -1,6 +1,7 @@
 """The command that shows what can be identified of a robot."""
 
 import sys
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from math import isfinite
 from typing import Any
@@ -13,10 +14,10 @@ from idbench.experiments.cli.command import with_own_parts
 from idbench.experiments.cli.options.tools import DescribeRobot
 from idbench.experiments.identification.robot_model import RobotModel, absolute
 from idbench.experiments.judgement.warnings import FILE, warnings_of_robot
-from idbench.experiments.reports.budget import Budget
+from idbench.experiments.reports.budget import largest_torques
 from idbench.experiments.results.page import new_page
 from idbench.experiments.text import new_table, print_titled
-from idbench.identify import Basis
+from idbench.identify import Array, Basis
 from idbench.identify.basis.operations import COLUMNS, Operations, operations
 from idbench.identify.blame import is_mistake
 from idbench.sim.errors import BenchError
@@ -39,7 +40,7 @@ def describe(options: DescribeRobot) -> None:
     _print_parameters(page, robot_model, truth, counts)
     try:
         moves = RandomMoves(moves=20, durations=(0.8, 1.6), velocity=(2.0,)).sample(robot_model.robot, 100.0)
-        _print_budget(page, Budget(robot_model.robot, moves))
+        _print_budget(page, robot_model.robot.joints, largest_torques(robot_model.robot, moves))
     except BenchError as error:  # the parameters are worth knowing all the same
         page.print(Text(f"no torque budget: {error}"), soft_wrap=True)
     page.warn({FILE: warnings_of_robot(robot_model.robot)})
@@ -110,10 +111,10 @@ def _operations(basis: Basis) -> dict[str, Operations]:
         return {}
 
 
-def _print_budget(page: Console, budget: Budget) -> None:
-    grid = new_table("", budget.largest)
-    for j, joint in enumerate(budget.robot.joints):
-        values = [value[j] for value in budget.largest.values()]
+def _print_budget(page: Console, joints: Sequence[str], largest: Mapping[str, Array]) -> None:
+    grid = new_table("", largest)
+    for j, joint in enumerate(joints):
+        values = [value[j] for value in largest.values()]
         grid.add_row(joint, *(f"{value:.3g}" if np.isfinite(value) else "" for value in values))
     print_titled(
         page, "torque budget: largest [N m, N of slides] along 20 random moves of 0.8 to 1.6 s, at most 2 rad/s or m/s", grid
