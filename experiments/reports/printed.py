@@ -61,7 +61,9 @@ def _grid(table: EstimatesTable, width: int, *, complete: bool) -> Table:
     heads, rows = [f"{first}\n{second}" for first, second in table.heads], list(table.rows())
     if len(table.estimates) == 1:
         plain = ["", "value", "unit", "%sigma"] if table.fit.truth is None else ["", "unit", "true", "value", "%e", "%sigma"]
-        return _beside(plain, [_ordered(cells) if table.fit.truth is None else cells for cells in rows], width)
+        if table.fit.truth is None:
+            rows = [[name, value, unit, share] for name, unit, value, share in rows]
+        return _beside(plain, rows, width)
     grid = new_table("", heads)
     for cells in rows:
         grid.add_row(*cells)
@@ -70,12 +72,6 @@ def _grid(table: EstimatesTable, width: int, *, complete: bool) -> Table:
         for cells in table.whole():
             grid.add_row(*cells)
     return grid
-
-
-def _ordered(cells: Sequence[str]) -> list[str]:
-    """Return name, unit, value and %sigma in the order in which they are read."""
-    name, unit, value, share = cells
-    return [name, value, unit, share]
 
 
 def _beside(heads: list[str], rows: list[list[str]], width: int) -> Table:

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from idbench.experiments.identification.fit import Fit
-from idbench.identify import Array, Estimate
+from idbench.identify import Estimate
 
 STRONG = 0.9  # Correlation above which two parameters are named: a change of one is then hardly told from one of the other
 
@@ -66,15 +66,12 @@ def correlated(estimate: Estimate) -> list[tuple[str, str, float]]:
     R = C / np.outer(sigma, sigma)
     of_functions = [p.is_random_effect for p in estimate.problem.basis.parameters]
     R[of_functions], R[:, of_functions] = 0.0, 0.0
-    found = [(estimate.names[i], estimate.names[j], float(R[i, j])) for i, j in _pairs(R)]
+    strong = np.argwhere(np.triu(np.abs(R), 1) > STRONG)
+    found = [(estimate.names[i], estimate.names[j], float(R[i, j])) for i, j in strong]
     if estimate.delay_covariance.any():
         of_delay = np.sqrt(np.maximum(np.diagonal(estimate.delay_covariance), 0.0)) / sigma
         found += [(estimate.names[k], DELAY, float(of_delay[k])) for k in np.flatnonzero(of_delay > STRONG)]
     return sorted(found, key=lambda pair: -abs(pair[2]))
-
-
-def _pairs(R: Array) -> list[tuple[int, int]]:
-    return [(int(i), int(j)) for i, j in np.argwhere(np.triu(np.abs(R), 1) > STRONG)]
 
 
 def _more(count: int) -> str:
