@@ -18,7 +18,7 @@ from rich.text import Text
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.rates import Rates
 from idbench.experiments.paper.attribution import COMPARED
-from idbench.experiments.paper.conclusion import conclusion_lines
+from idbench.experiments.paper.conclusion import conclusion_line
 from idbench.experiments.results.writing import summarize
 from idbench.experiments.text import print_table, printed
 from idbench.identify import (
@@ -167,29 +167,21 @@ class Table1:
 OVER = {"energy": "power", "integral": "implicit"}  # Models that are others, integrated
 
 
-def _finer(chain: Chain) -> Chain:
-    return replace(chain, differentiator=CentralDifference(6))
+FINER: dict[str, Any] = {"differentiator": CentralDifference(6)}
+UNFILTERED: dict[str, Any] = {"prefilter": NoPrefilter()}
+MASKED: dict[str, Any] = {"mask": paper_masked_chain().mask}
 
-
-def _unfiltered(chain: Chain) -> Chain:
-    return replace(chain, prefilter=NoPrefilter())
-
-
-def _masked(chain: Chain) -> Chain:
-    return replace(chain, mask=paper_masked_chain().mask)
-
-
-CHANGES: dict[str, tuple[Callable[[Chain], Chain], ...]] = {
-    "the paper's steps": (),
-    "6th-order differences": (_finer,),
-    "no prefilter": (_unfiltered,),
-    "reversals masked": (_masked,),
-    "6th order, no prefilter": (_finer, _unfiltered),
-    "6th order, masked": (_finer, _masked),
-    "no prefilter, masked": (_unfiltered, _masked),
-    "all three": (_finer, _unfiltered, _masked),
+CHANGES: dict[str, dict[str, Any]] = {
+    "the paper's steps": {},
+    "6th-order differences": FINER,
+    "no prefilter": UNFILTERED,
+    "reversals masked": MASKED,
+    "6th order, no prefilter": FINER | UNFILTERED,
+    "6th order, masked": FINER | MASKED,
+    "no prefilter, masked": UNFILTERED | MASKED,
+    "all three": FINER | UNFILTERED | MASKED,
 }
-"""Every combination of the three suspects taken out of chain `paper`."""
+"""Every combination of the three suspects taken out of chain `paper`: the stages that replace its own."""
 
 
 @dataclass(frozen=True)
@@ -203,9 +195,7 @@ class Worst:
 def causes(table: Table1) -> Iterator[tuple[str, dict[str, Worst]]]:
     """Yield, for every combination, the worst errors of each model on the data of `table`."""
     for name, changes in CHANGES.items():
-        chain = replace(paper_chain(), trim=table.scenario.quintic().rest)
-        for change in changes:
-            chain = change(chain)
+        chain = replace(paper_chain(), trim=table.scenario.quintic().rest, **changes)
         estimates = identify_each(table.log, scara(), COMPARED, chain, OrdinaryLeastSquares())
         yield name, {form: _worst(table, estimate) for form, estimate in estimates.items()}
 
@@ -244,8 +234,7 @@ def print_table1(console: Console, table: Table1) -> None:
         print_table(console, _causes_table(table))
     if "idbench" in table.chains:
         console.print(Text(EXACT))
-    for line in conclusion_lines():
-        console.print(Text(line))
+    console.print(Text(conclusion_line()))
 
 
 def _model_table(table: Table1, form: str) -> Table:

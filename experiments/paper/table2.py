@@ -21,7 +21,7 @@ from idbench.experiments.identification.logs import Logs
 from idbench.experiments.identification.request import Request
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.paper.attribution import Attribution, Errors
-from idbench.experiments.paper.conclusion import conclusion_lines
+from idbench.experiments.paper.conclusion import conclusion_line
 from idbench.experiments.text import new_table, percent, print_table, printed
 from idbench.identify import CHAINS, Estimate, TorqueChannel
 from idbench.sim.engine.run import Run
@@ -176,8 +176,7 @@ def print_table2(console: Console, table: Table2) -> None:
         for name, errors in table.attribution.items():
             grid.add_row(name, *(percent(error) for error in errors[form]))
         print_table(console, grid)
-    for line in conclusion_lines():
-        console.print(Text(line))
+    console.print(Text(conclusion_line()))
 
 
 def _twin(table: Table2, model: str) -> Table:
