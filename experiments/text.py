@@ -176,6 +176,12 @@ def _of_columns(grid: Table, stub: int, groups: Sequence[Sequence[Column]]) -> T
     return made
 
 
+def markdown(title: str, heads: Sequence[str], rows: Iterable[list[str]]) -> str:
+    """Return a table as markdown, its first column of names, the others of numbers."""
+    lines = [f"| {' | '.join(cells)} |" for cells in (["", *heads], ["---", *["---:"] * len(heads)], *rows)]
+    return "\n".join([f"{title}\n", *lines])
+
+
 def number(x: float) -> str:
     """Return a number to five digits, a small one to three."""
     return f"{x:#.5g}" if abs(x) >= 1e-3 or x == 0 else f"{x:.2e}"

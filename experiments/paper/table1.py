@@ -4,9 +4,9 @@ Expected: with the paper's own steps ZZR1 slightly too large in all models, by i
 models, by reversals; with chain `idbench` no error above 0.001 %, so that nothing but the method limited the paper.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -20,11 +20,10 @@ from idbench.experiments.identification.rates import Rates
 from idbench.experiments.paper.attribution import COMPARED
 from idbench.experiments.paper.conclusion import conclusion_line
 from idbench.experiments.results.writing import summarize
-from idbench.experiments.text import print_table, printed
+from idbench.experiments.text import markdown, print_table, printed
 from idbench.identify import (
     CHAINS,
     MODELS,
-    Array,
     CentralDifference,
     Chain,
     Estimate,
@@ -288,24 +287,10 @@ def table1_markdown(table: Table1) -> str:
     truth, forms = list(table.truth.values()), list(next(iter(table.estimates.values())))
     found = {form: [estimates[form] for estimates in table.estimates.values()] for form in forms}
     errors = {form: [e.relative_error_percent(truth) for e in found[form]] for form in forms}
-
-    def row(head: str, cells: Callable[[str], Iterable[str]]) -> str:
-        return f"| {head} | " + " | ".join(" → ".join(cells(form)) for form in forms) + " |"
-
-    return "\n".join(
-        [
-            f"Error [%] in chain **{' → '.join(table.chains)}**\n",
-            f"| | {' | '.join(forms)} |",
-            "|---|" + "---:|" * len(forms),
-            *(
-                row(f"{i + 1} {name} {true:g}", partial(_error_cells, errors, i))
-                for i, (name, true) in enumerate(table.truth.items())
-            ),
-            row("Cond(W)", lambda form: (f"{e.condition_number:.1f}" for e in found[form])),
-            row("rows", lambda form: (f"{e.row_count}" for e in found[form])),
-        ]
-    )
-
-
-def _error_cells(errors: Mapping[str, list[Array]], i: int, form: str) -> Iterable[str]:
-    return (f"{error[i]:.1g}" for error in errors[form])
+    rows = [
+        [f"{i + 1} {name} {true:g}", *(" → ".join(f"{error[i]:.1g}" for error in errors[form]) for form in forms)]
+        for i, (name, true) in enumerate(table.truth.items())
+    ]
+    rows.append(["Cond(W)", *(" → ".join(f"{e.condition_number:.1f}" for e in found[form]) for form in forms)])
+    rows.append(["rows", *(" → ".join(f"{e.row_count}" for e in found[form]) for form in forms)])
+    return markdown(f"Error [%] in chain **{' → '.join(table.chains)}**", forms, rows)

@@ -27,8 +27,7 @@ from idbench.experiments.recording.layouts import tabs
 from idbench.experiments.recording.motion_layer import Base
 from idbench.experiments.recording.scales import listed, signed
 from idbench.experiments.recording.stream import SIZES, Stream
-from idbench.experiments.reports.estimates import markdown
-from idbench.experiments.text import FORM_WIDTHS, FORMS, GREY, joint_colors, lighter, model_color, with_unit
+from idbench.experiments.text import FORM_WIDTHS, FORMS, GREY, joint_colors, lighter, markdown, model_color, with_unit
 from idbench.identify import scara
 from idbench.sim.scenario.scenario_file import to_toml
 

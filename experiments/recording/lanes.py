@@ -9,7 +9,8 @@ import numpy.typing as npt
 from idbench.experiments.identification.fit import Fit
 from idbench.experiments.recording.columns import time_columns
 from idbench.experiments.recording.stream import Stream
-from idbench.experiments.reports.estimates import LEAST, EstimatesTable, markdown, models_apart
+from idbench.experiments.reports.estimates import LEAST, EstimatesTable, models_apart
+from idbench.experiments.text import markdown
 from idbench.identify import Array
 
 WHERE = {"friction": "friction", "drive": "friction"}

@@ -100,12 +100,6 @@ class EstimatesTable:
         yield from (f"{number(x)}{first}", f"{percent(error) if isfinite(error) else ''}{second}", f"{share}{last}")
 
 
-def markdown(title: str, heads: Sequence[str], rows: Iterator[list[str]]) -> str:
-    """Return a table as markdown, its first column of names, the others of numbers."""
-    lines = [f"| {' | '.join(cells)} |" for cells in (["", *heads], ["---", *["---:"] * len(heads)], *rows)]
-    return "\n".join([f"{title}\n", *lines])
-
-
 def _explained(share: float) -> str:
     if not isfinite(share):
         return "no torque"
