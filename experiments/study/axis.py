@@ -130,21 +130,17 @@ class Setting:
             else:
                 raise StudyError(f"axis {field} is a table of settings: give tables as values, or name one of its settings")
 
-    def chain(self, chain: Chain) -> Chain:
-        """Return `chain` with this value, if it is one of the chain's."""
+    def applied(self, part: Any, name: str) -> Any:
+        """Return a chain or an estimator, as `name` says, with this value if it is one of its own; raise StudyError."""
         for field in self.axis.all_fields:
             root, *path = field.split(".")
-            if root == "chain":
-                chain = _set(chain, path, self.value, field)
-        return chain
-
-    def estimator(self, estimator: Any) -> Any:
-        """Return `estimator` with this value, if it is one of the estimator's."""
-        for field in self.axis.all_fields:
-            root, *path = field.split(".")
-            if root == "estimator":
-                estimator = _set(estimator, path, self.value, field)
-        return estimator
+            if root == name:
+                try:
+                    part = replaced(part, path, self.value)
+                except ExperimentError as error:
+                    sets = "no such setting" in str(error)
+                    raise StudyError(f"axis {field}{'' if sets else f' = {self.value!r:.60}'}: {error}") from error
+        return part
 
 
 def paths_of(table: Mapping[str, Any], above: str = "") -> Iterator[str]:
@@ -167,15 +163,6 @@ def merge(content: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, A
 
 def _of_identification(field: str) -> bool:
     return field == FRICTION or field.split(".", maxsplit=1)[0] in ("chain", "estimator")
-
-
-def _set(part: Any, path: list[str], value: Any, field: str) -> Any:
-    """Return a part with a value of a field; raise StudyError that names the axis."""
-    try:
-        return replaced(part, path, value)
-    except ExperimentError as error:
-        sets = "no such setting" in str(error)
-        raise StudyError(f"axis {field}{'' if sets else f' = {value!r:.60}'}: {error}") from error
 
 
 def _plain(value: Any) -> Any:
@@ -210,7 +197,7 @@ def methods_of(chains: Sequence[str], estimators: Sequence[str], friction: str, 
         if name != chains[0] and not estimator.filtered:
             continue
         for setting in whole_first(combination):
-            chain, estimator = setting.chain(chain), setting.estimator(estimator)
+            chain, estimator = setting.applied(chain, "chain"), setting.applied(estimator, "estimator")
         laws = next((str(setting.value) for setting in combination if setting.axis.field == FRICTION), friction)
         yield Method(name, way, chain, estimator, laws, combination)
 
