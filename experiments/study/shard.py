@@ -75,7 +75,7 @@ class Shard:
     seconds: dict[str, float] = field(default_factory=lambda: defaultdict(float))
 
 
-def run_shard(study: Study, runs: range, *, threads: int = 1, progress: Progress | None = None) -> Shard:
+def run_shard(study: Study, runs: range, *, progress: Progress | None = None) -> Shard:
     """Simulate and identify runs of one combination of the grid; a run that fails leaves its reason in its rows.
 
     Parameters
@@ -84,8 +84,6 @@ def run_shard(study: Study, runs: range, *, threads: int = 1, progress: Progress
         What to run.
     runs : range
         Numbers of the runs, all of one point of the grid.
-    threads : int
-        Native threads of the simulation.
     progress : callable, optional
         Receives the share that is done: the simulation and each method count alike.
     """
@@ -96,7 +94,7 @@ def run_shard(study: Study, runs: range, *, threads: int = 1, progress: Progress
     for together in _groups(study, scenarios, shard):
         start, tell = time.perf_counter(), _part(progress, done, len(together), steps * len(runs))
         try:
-            simulated = _simulate(study, scenarios, together, threads, tell)
+            simulated = _simulate(study, scenarios, together, tell)
             known = {} if study.of_servos else {x: _known(study, model, simulated) for x, model in study.subjects.items()}
         except BenchError as error:
             _fail(shard, study, scenarios, list(together), str(error))
@@ -141,15 +139,15 @@ def _known(study: Study, robot_model: RobotModel, simulated: Run) -> tuple[dict[
 
 
 def _simulate(
-    study: Study, scenarios: Mapping[int, Scenario], together: Mapping[int, Reference | None], threads: int, progress: Progress
+    study: Study, scenarios: Mapping[int, Scenario], together: Mapping[int, Reference | None], progress: Progress
 ) -> Run:
-    """Return the first log of every run, then the second of every run, and so on, as so many simulations."""
+    """Return the first log of every run, then the second of every run, and so on, as so many simulations on one thread."""
     first, motions = scenarios[next(iter(together))], [motion for motion in together.values() if motion is not None]
     seeds = [seed for each in zip(*map(study.seeds_of, together), strict=True) for seed in each]
     motions *= study.most_logs
     if study.data == "ideal":
         return ideal_run(first, seeds, motions)
-    return simulate(first, seeds, motions=motions, threads=threads, progress=progress, throw=False)
+    return simulate(first, seeds, motions=motions, threads=1, progress=progress, throw=False)
 
 
 def _part(progress: Progress | None, done: int, part: int, whole: int) -> Progress:

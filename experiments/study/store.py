@@ -25,22 +25,6 @@ from idbench.experiments.study.study_file import read_toml, study_from
 NAME = re.compile(r"runs-(\d{10})-(\d{10})\.parquet")
 
 
-def write_shard(folder: Path, study: Study, runs: range, shard: Shard) -> None:
-    """Write a finished shard: beside, and then renamed; raise ResultsError if that fails."""
-    path = folder / f"runs-{runs[0]:010}-{runs[-1]:010}.parquet"
-    beside = path.with_name(f".{path.name}.{os.getpid()}")
-    metadata = {"fingerprint": study.fingerprint, "versions": json.dumps(versions()), "seconds": json.dumps(shard.seconds)}
-    try:
-        pq.write_table(pa.Table.from_pylist(shard.rows, schema=_schema(study).with_metadata(metadata)), beside)
-        with beside.open("rb+") as file:
-            os.fsync(file.fileno())
-        beside.replace(path)
-    except OSError as error:
-        raise ResultsError(f"cannot write to {folder}: {error.strerror or error}; make room and go on with --resume") from error
-    finally:
-        beside.unlink(missing_ok=True)
-
-
 def read_shard(path: Path, run: int | None = None) -> pa.Table:
     """Return the rows of a shard, or those of one run of it; raise StudyError if the file is damaged."""
     try:
@@ -196,12 +180,22 @@ class Store:
             next_run = max(next_run, done.stop)
 
     def write(self, runs: range, shard: Shard) -> None:
-        """Write a finished shard, whole or not at all."""
-        write_shard(self.folder / "shards", self.study, runs, shard)
-
-    def part(self, runs: range) -> pa.Table:
-        """Return the rows of the finished shard of `runs`."""
-        return pa.concat_tables([read_shard(path) for path in self.shards() if runs_of(path) == runs])
+        """Write a finished shard, whole or not at all: beside, and then renamed; raise ResultsError if that fails."""
+        folder, study = self.folder / "shards", self.study
+        path = folder / f"runs-{runs[0]:010}-{runs[-1]:010}.parquet"
+        beside = path.with_name(f".{path.name}.{os.getpid()}")
+        metadata = {"fingerprint": study.fingerprint, "versions": json.dumps(versions()), "seconds": json.dumps(shard.seconds)}
+        try:
+            pq.write_table(pa.Table.from_pylist(shard.rows, schema=_schema(study).with_metadata(metadata)), beside)
+            with beside.open("rb+") as file:
+                os.fsync(file.fileno())
+            beside.replace(path)
+        except OSError as error:
+            raise ResultsError(
+                f"cannot write to {folder}: {error.strerror or error}; make room and go on with --resume"
+            ) from error
+        finally:
+            beside.unlink(missing_ok=True)
 
     def table(self) -> pa.Table:
         """Return the rows of all finished shards, by run, method and model."""
