@@ -109,8 +109,9 @@ def study(
     if unknown := sorted(parts.keys() - tables.keys()):
         raise ExperimentError(f"study: unknown key {unknown[0]!r}; known: seeds, out, threads, {', '.join(tables)}")
     changed: dict[str, Any] = {key: tuple(map(tables[key].name_of, several(value))) for key, value in parts.items()}
-    described = load_study(str(name))
-    described = replace(described, **changed) if seeds is None else replace(described, **changed).with_seeds(seeds)
+    if seeds is not None:
+        changed["seeds"] = seeds
+    described = replace(load_study(str(name)), **changed)
     asked = jobs.StudyRequest(threads=threads)
     with TemporaryDirectory(prefix="idbench-") as folder:
         store = _store(described, Path(folder) / described.name if out is None else Path(out))

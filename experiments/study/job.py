@@ -2,6 +2,7 @@
 
 import os
 from contextlib import AbstractContextManager, nullcontext
+from dataclasses import replace
 from math import ceil
 from pathlib import Path
 from typing import Any
@@ -60,7 +61,7 @@ def worker_pool(asked: StudyRequest, store: Store) -> AbstractContextManager[Any
 
 
 def _begun(name: str, out: Path | None, seeds: int | None, many: bool) -> Store:
-    described = load_study(name) if seeds is None else load_study(name).with_seeds(seeds)
+    described = load_study(name) if seeds is None else replace(load_study(name), seeds=seeds)
     if described.size > MANY and not many:
         raise StudyError(f"{name} has {described.size:,} runs, more than {MANY:,}: if you mean it, add --yes")
     _ = described.points  # every combination is looked at before the first is run

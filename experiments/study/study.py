@@ -21,16 +21,13 @@ from idbench.identify.models import THREE, rows_per_sample
 from idbench.sim.drives import ServoDrive
 from idbench.sim.scenario.scenario import Scenario
 from idbench.sim.scenario.scenario_file import from_dict
-from idbench.sim.settings import NotNegative, Seed, Truth, Whole, settings
+from idbench.sim.settings import NotNegative, Seed, Truth, Whole, fields_of, settings
 from idbench.sim.trajectories import RandomMoves, RandomPace, RandomSteps
 
 MOST_POINTS = 1_000_000
 """Combinations of settings of simulation, above which axes are taken for a slip: each is looked at before the first is run."""
 
 MOST_METHODS = 1000  # Identifications of every run, above which axes are taken for a slip
-
-PLAIN = ("name", "question", "seeds", "seed", "motion", "start", "bound", "data", "realizations", "rows")
-"""Keys of a study whose values are no tables or lists."""
 
 RESULTS = ("run", "seed", "chain", "estimator", "model", "failure", "condition_number", "rows", "residual_rms", "simulations")
 """Columns of the results beside those of axes and parameters."""
@@ -231,10 +228,6 @@ class Study:
             robot_model.require_laws()
         return found
 
-    def with_seeds(self, seeds: int) -> "Study":
-        """Return this study with another number of independent runs."""
-        return replace(self, seeds=seeds)
-
     def scenario_of(self, run: int) -> Scenario:
         """Return the scenario of a run by itself; the same run of the same study is the same, whatever runs beside it.
 
@@ -285,8 +278,9 @@ class Study:
             listed = {"values": list(axis.values)} if axis.values else {"cases": axis.cases} if axis.cases else {}
             spaced = {k: getattr(axis, k) for k in ("lowest", "highest", "count", "spacing")} if not listed else {}
             axes.append({"field": axis.field, **listed, **spaced, **({"also": list(axis.also)} if axis.also else {})})
-        plain = {key: getattr(self, key) for key in PLAIN}
-        lists = {key: list(getattr(self, key)) for key in ("models", "chains", "estimators", "friction")}
+        others = {key: getattr(self, key) for key in fields_of(Study) if key not in ("axes", "scenario")}
+        plain = {key: x for key, x in others.items() if not isinstance(x, tuple)}
+        lists = {key: list(x) for key, x in others.items() if isinstance(x, tuple)}
         return {**plain, **lists, "axes": axes, "scenario": self.scenario}
 
 

@@ -66,9 +66,7 @@ def study_from(content: dict[str, Any], what: str) -> Study:
                 raise StudyError(f"axis {axis.get('field')}: values = {axis['values']!r:.60} must be a list, [ ... ]")
         made["axes"] = tuple(made.get("axes", ()))
         study: Study = make(Study, made, "")
-    except ScenarioError as error:
-        raise StudyError(f"{what}: {error}") from error
-    except StudyError as error:
+    except (ScenarioError, StudyError) as error:
         raise StudyError(f"{what}: {error}") from error
     return study
 

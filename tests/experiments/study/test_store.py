@@ -1,5 +1,7 @@
 """The folder of a study: what it refuses, and what survives."""
 
+from dataclasses import replace
+
 import pyarrow.parquet as pq
 import pytest
 
@@ -47,7 +49,7 @@ def test_a_folder_of_this_study_is_gone_on_with(begun, small):
 
 def test_a_folder_of_another_study_is_refused(begun, small):
     with pytest.raises(StudyError, match="holds another study, or this one before it was changed"):
-        Store.new(small.with_seeds(3), begun.folder)
+        Store.new(replace(small, seeds=3), begun.folder)
 
 
 def test_shards_without_a_description_are_refused(begun, small):
@@ -85,7 +87,7 @@ def test_two_processes_do_not_share_a_folder(begun):
 
 def test_a_study_that_came_into_the_folder_meanwhile_is_noticed(small, tmp_path):
     """Both have looked, and found it empty; one begins."""
-    one, other = Store.new(small, tmp_path / "out"), Store.new(small.with_seeds(3), tmp_path / "out")
+    one, other = Store.new(small, tmp_path / "out"), Store.new(replace(small, seeds=3), tmp_path / "out")
     with one.held():
         pass
     with pytest.raises(StudyError, match="holds another study"), other.held():

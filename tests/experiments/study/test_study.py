@@ -3,6 +3,7 @@
 import itertools
 import re
 import tomllib
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -101,7 +102,7 @@ def test_every_run_has_seeds_of_its_own(small):
 
 
 def test_more_seeds_keep_the_runs_that_there_were(small):
-    more = small.with_seeds(20)
+    more = replace(small, seeds=20)
     for point, number in ((0, 3), (1, 8)):
         assert more.scenario_of(20 * point + number) == small.scenario_of(9 * point + number)
 
@@ -115,7 +116,7 @@ def test_text_and_toml_say_it_all(small):
     again = study_from_text(small.text)
     assert again == small
     assert again.fingerprint == small.fingerprint
-    assert small.with_seeds(8).fingerprint != small.fingerprint
+    assert replace(small, seeds=8).fingerprint != small.fingerprint
 
 
 @pytest.mark.parametrize("name", names())
