@@ -38,7 +38,7 @@ def typical_figure(families: Mapping[str, Sequence[Cell]], axis: Axis, edges: in
             ends = np.abs(100 * np.array([c.typical_interval for c in group]).T - y)
             panel.errorbar(x, y, ends, color=_color(model), label=model, lw=_width(cells, model), marker=".", capsize=2)
             if np.isfinite(least := np.array([100 * c.typical_least() for c in group])).any():
-                panel.plot(x, least, color="black", ls=":", lw=1.0, label="bound" if model == _last(cells) else None)
+                panel.plot(x, least, color="black", ls=":", lw=1.0, label="bound")
         panel.set_yscale("log")
         panel.set_title(title)
     named = {label: handle for panel in grid for handle, label in zip(*panel.get_legend_handles_labels(), strict=True)}
@@ -46,10 +46,6 @@ def typical_figure(families: Mapping[str, Sequence[Cell]], axis: Axis, edges: in
     figure.supylabel("typical error [%]", fontsize=9)
     figure.supxlabel(axis.field, fontsize=9)
     return svg(figure)
-
-
-def _last(cells: Sequence[Cell]) -> str:
-    return list(_models(cells))[-1]
 
 
 def error_figure(cells: Sequence[Cell], axis: Axis) -> str:

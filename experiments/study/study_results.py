@@ -48,7 +48,8 @@ if TYPE_CHECKING:
 
 def report(study: Study, cells: Sequence[Cell], seconds: dict[str, float], folder: Path) -> str:
     """Return the page: question, answer, tables, figures, and how to make it again."""
-    solved = [cell for cell in cells if cell.runs]
+    solved, axis = [cell for cell in cells if cell.runs], main_axis(study)
+    alike = families(study, solved)
     return rendered(
         "idbench.experiments.study",
         "report.html.j2",
@@ -56,11 +57,14 @@ def report(study: Study, cells: Sequence[Cell], seconds: dict[str, float], folde
         methods=len(study.methods),
         headline="" if _compares(study) or not solved else headline(solved, study.edges),
         answer=study_answer(study, cells),
-        typical=typical_figure(dict(families(study, solved)), main_axis(study), study.edges) if solved else "",
+        typical=typical_figure(alike, axis, study.edges) if solved else "",
         axes=[short(name) for name in cells[0].settings],
         overview=[_overview(cell) for cell in cells],
-        families=[_family(title, group, main_axis(study)) for title, group in families(study, solved)],
-        bars=[(title, bars_figure(group)) for title, group in _comparisons(study, solved)],
+        families=[
+            {"title": title, "error": error_figure(group, axis), "coverage": coverage_figure(group, axis)}
+            for title, group in alike.items()
+        ],
+        bars=[(title, bars_figure(group)) for title, group in grouped(solved).items()] if len(study.estimators) > 1 else [],
         ratios=[[where(cell, cells), pair_of(row), interval(row), f"{row['runs']}"] for cell, row in ratios(solved)]
         if study.rows == "equal"
         else [],
@@ -99,24 +103,13 @@ def main_axis(study: Study) -> Axis:
     return max(study.every_axis, key=lambda axis: len(axis.points))
 
 
-def families(study: Study, cells: Sequence[Cell]) -> Iterator[tuple[str, list[Cell]]]:
-    """Yield the cells that differ only in the main axis and the model, with what they have in common."""
+def families(study: Study, cells: Sequence[Cell]) -> dict[str, list[Cell]]:
+    """Return the cells that differ only in the main axis and the model, by what they have in common."""
     main, groups = main_axis(study).field, dict[str, list[Cell]]()
     for cell in cells:
         fixed = [f"{short(name)} {value(x)}" for name, x in cell.settings.items() if name != main]
         groups.setdefault(", ".join([*fixed, f"chain {cell.names[0]}", cell.names[1]]), []).append(cell)
-    yield from groups.items()
-
-
-def _comparisons(study: Study, cells: Sequence[Cell]) -> Iterator[tuple[str, list[Cell]]]:
-    """Yield the cells of each combination of settings, of studies that compare estimators."""
-    if len(study.estimators) > 1:
-        yield from grouped(cells).items()
-
-
-def _family(title: str, cells: Sequence[Cell], axis: Axis) -> dict[str, Any]:
-    figures = {"error": error_figure(cells, axis), "coverage": coverage_figure(cells, axis)}
-    return {"title": title, **figures}
+    return groups
 
 
 def _overview(cell: Cell) -> list[str]:
@@ -131,8 +124,8 @@ def _overview(cell: Cell) -> list[str]:
         share = share[np.isfinite(share)]  # of what was identified
         shares.append(f"{share.mean():.0f} % ({share.min():.0f} to {share.max():.0f})" if share.size else "")
     least = [percent(x) if np.isfinite(x := cell.typical_least(bound)) else "" for bound in BOUNDS]
-    often = f"{cell.mean_simulations:.3g}" if cell.mean_simulations else ""
-    return [*head, percent(cell.typical), *least, f"{percent(cell.rmse[worst])} {cell.parameters[worst]}", *shares, often]
+    largest = f"{percent(cell.rmse[worst])} {cell.parameters[worst]}"
+    return [*head, percent(cell.typical), *least, largest, *shares, _often(cell)]
 
 
 def _details(cell: Cell, title: str) -> Iterator[list[str]]:
@@ -189,7 +182,7 @@ def print_study(page: Console, study: Study, found: Sequence[Cell]) -> None:
         numbers = f"{cell.runs}", f"{cell.failed or ''}"
         bounds = [percent(cell.typical_least(bound)) for bound in BOUNDS] if least else []
         errors = [percent(cell.typical), *bounds] if cell.runs else [""] * (1 + len(least))
-        judged = *errors, _held(cell), *_often(cell, often)
+        judged = *errors, _held(cell), *([_often(cell)] if often else [])
         grid.add_row(*settings, method(cell, found), *numbers, *judged)
     grid.columns[0].header = axes[0]
     print_table(page, grid, len(axes) + 1)
@@ -206,8 +199,9 @@ def _held(cell: Cell) -> str:
     return f"{100 * np.nanmean(held):.0f} %" if np.isfinite(held).any() else ""
 
 
-def _often(cell: Cell, shown: Sequence[str]) -> list[str]:
-    return [f"{cell.mean_simulations:.3g}" if cell.mean_simulations else ""] if shown else []
+def _often(cell: Cell) -> str:
+    """How often the estimator simulated a run; empty if it does not."""
+    return f"{cell.mean_simulations:.3g}" if cell.mean_simulations else ""
 
 
 def _reasons(found: Sequence[Cell]) -> list[str]:
