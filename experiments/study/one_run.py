@@ -37,7 +37,9 @@ def run_of(asked: RunRequest, tell: Callable[[str], None]) -> ScenarioRun:
         if asked.parameters != Parameters():
             raise ExperimentError("--from: which parameters are identified is the study's; leave --friction and the like out")
     else:
-        scenario = _with_robot(tell, load(_alone(asked.scenario, asked.study, asked.index)), asked.robot)
+        if asked.study is not None or asked.index is not None:
+            raise ExperimentError(f"{asked.scenario} and --from or --index: name a scenario, or a run of a study")
+        scenario = _with_robot(tell, load(asked.scenario), asked.robot)
         names = (asked.chain, asked.estimator)
         name = ""
         chosen = None
@@ -73,12 +75,6 @@ def _has_motors(robot: str) -> bool:
         return Robot.load(robot).motors is not None
     except RobotError:
         return False
-
-
-def _alone(scenario: str, study: Path | None, index: int | None) -> str:
-    if study is not None or index is not None:
-        raise ExperimentError(f"{scenario} and --from or --index: name a scenario, or a run of a study")
-    return scenario
 
 
 def _again(tell: Callable[[str], None], folder: Path | None, index: int | None, method: int | None) -> tuple[Scenario, Method]:
