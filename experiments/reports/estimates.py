@@ -58,12 +58,13 @@ class EstimatesTable:
 
     def whole(self) -> Iterator[list[str]]:
         """Yield the cells of what is said of each fit as a whole."""
+        # Unit and truth have no cells, nor have the other columns of a model: as many.
         estimates, before = self.estimates.values(), [""] * (1 + (self.fit.truth is not None))
         every = {"Cond(W)": [f"{e.condition_number:.1f}" for e in estimates], "rows": [f"{e.row_count}" for e in estimates]}
         for j in range(self.fit.basis.n):
             every[f"tau{j + 1} explained"] = [_explained(self.fit.explained[model][j]) for model in self.estimates]
         for name, cells in every.items():
-            yield [name, *before, *(cell for first in cells for cell in (first, *[""] * (self._width - 1)))]
+            yield [name, *before, *(cell for first in cells for cell in (first, *before))]
 
     @property
     def _shown(self) -> list[tuple[int, str]]:
@@ -71,16 +72,10 @@ class EstimatesTable:
         names = self.fit.basis.names
         return [(i, names[i]) for i in self.fit.basis.without_random_effects]
 
-    @property
-    def _width(self) -> int:
-        """Columns of a model."""
-        return 3 if self.fit.truth is not None else 2
-
     @cached_property
     def legend(self) -> str:
         """What the marks mean that are used."""
-        marks = [f"{flag} {FLAGS[flag]}" for flag in used(self._marks)]
-        return "; ".join(marks)
+        return "; ".join(f"{flag} {FLAGS[flag]}" for flag in used(self._marks))
 
     @cached_property
     def _marks(self) -> dict[str, list[tuple[str, str, str]]]:
