@@ -161,14 +161,12 @@ class ClusterPool:
         return future
 
     def partial(self) -> float:
-        """Return 0: how far a worker is in a shard is not known; raise StudyError if no worker has been there for long."""
-        self._look(sum(self._client.nthreads().values()))
-        return 0.0
+        """Return 0: how far a worker is in a shard is not known.
 
-    def _look(self, threads: int) -> None:
-        """Say when all workers have gone, and when one is back; raise StudyError if none comes."""
+        Say when all workers have gone, and when one is back; raise StudyError if none comes.
+        """
         away = time.monotonic() - self._seen
-        if threads:
+        if sum(self._client.nthreads().values()):
             if self._told:
                 sys.stderr.write("idbench: a worker is there: the study goes on\n")
             self._seen, self._told = time.monotonic(), False
@@ -181,6 +179,7 @@ class ClusterPool:
             sys.stderr.write(
                 f"idbench: all workers are gone; waiting {DESERTED:.0f} s for new ones; Ctrl-C keeps what there is\n"
             )
+        return 0.0
 
 
 @contextmanager
