@@ -1,7 +1,7 @@
 """Whether two ways of identification differ, on the same runs."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import combinations
 
@@ -38,12 +38,10 @@ def differences(group: Sequence[Cell]) -> list[Difference]:
     """Return, for every pair of cells of the same runs, which is better and how sure that is."""
     pairs = list(combinations(group, 2))
     found = [_difference(a, b, max(DRAWS, int(EACH * len(pairs)))) for a, b in pairs]
-    order = sorted(range(len(found)), key=lambda i: found[i].p)
-    corrected, least = {}, 0.0
-    for rank, i in enumerate(order):
-        least = max(least, min(1.0, (len(found) - rank) * found[i].p))
-        corrected[i] = least
-    return [Difference(d.better, d.worse, d.ratio, corrected[i], d.runs) for i, d in enumerate(found)]
+    p = np.array([d.p for d in found])
+    order, times = np.argsort(p, kind="stable"), np.arange(len(p), 0, -1)
+    p[order] = np.maximum.accumulate(np.minimum(1.0, times * p[order]))
+    return [replace(d, p=corrected) for d, corrected in zip(found, p.tolist(), strict=True)]
 
 
 @lru_cache(maxsize=4096)
