@@ -166,9 +166,8 @@ def table1_of(asked: Table1Request, searching: Searching | None = None) -> Table
     if asked.seed is not None and asked.scenario is not None:
         raise ExperimentError(f"--seed {asked.seed} and --scenario {asked.scenario} name two trajectories: give one")
     chains = CHAINS_COMPARED if asked.chain == "all" else (asked.chain,)
-    return Table1(
-        load(asked.scenario or SCENARIO) if asked.seed is None else searched(asked.seed, searching or (lambda *_: None)), chains
-    )
+    scenario = load(asked.scenario or SCENARIO) if asked.seed is None else searched(asked.seed, searching)
+    return Table1(scenario, chains)
 
 
 def table2_of(asked: Table2Request, progress: Callable[[float], None], watch: Watch | None = None) -> Table2:
@@ -176,6 +175,6 @@ def table2_of(asked: Table2Request, progress: Callable[[float], None], watch: Wa
     return Table2(load(asked.scenario), progress, watch)
 
 
-def searched(seed: int, searching: Searching) -> Scenario:
+def searched(seed: int, searching: Searching | None = None) -> Scenario:
     """Return a scenario whose trajectory has the paper's condition numbers."""
     return TrajectorySearch(seed=seed).run(Robot.load("scara"), searching)

@@ -183,8 +183,7 @@ def _motion_figure(found: Excited) -> str:
             panel.plot(t, 100 * values[::step, j], color=shade, lw=1.0, label=joint)
         panel.set_ylabel(f"{name}\n[% of limit]")
     panels[-1].set_xlabel("time [s]")
-    handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=8, frameon=False)
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=8, frameon=False)
     return svg(figure)
 
 

@@ -24,8 +24,7 @@ def figure_of(facts: LogFacts) -> Figure:
             panel.plot(log.t[::step], values[::step, j], color=_color(j), lw=0.8, label=joint)
         panel.set_ylabel(name)
     panels[-1].set_xlabel("time [s]")
-    handles, labels = panels[-1].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=8, frameon=False)
+    figure.legend(*panels[-1].get_legend_handles_labels(), loc="outside upper center", ncols=8, frameon=False)
     spectra, clock = figure.add_subplot(grid[3, 0]), figure.add_subplot(grid[3, 1])
     f, power = welch(log.tau.T, log.fs, min(log.samples, round(4 * log.fs)))
     for j in range(log.n):
