@@ -55,17 +55,17 @@ QUIET = {
 
 
 @contextmanager
-def connected(scheduler: str | None, workers: int, then: str) -> Iterator["Client"]:
-    """Give a client of a scheduler, or of as many new processes of this machine.
+def cluster_pool(study: Study, scheduler: str | None, workers: int) -> Iterator["ClusterPool"]:
+    """Give the workers of a scheduler, or of as many new processes of this machine.
 
     Parameters
     ----------
+    study : Study
+        What to run.
     scheduler : str, optional
         Its address.
     workers : int
         Processes, where no scheduler is given.
-    then : str
-        What to do if the workers are lost.
 
     Raises
     ------
@@ -97,11 +97,11 @@ def connected(scheduler: str | None, workers: int, then: str) -> Iterator["Clien
             raise StudyError(f"cannot reach the scheduler {scheduler}: {error}") from error
         _require_workers(client)
         try:
-            yield client
+            yield ClusterPool(study, client)
         except (CancelledError, KilledWorker, CommClosedError, TimeoutError) as error:
             said = " ".join(str(error).split())[:200]
             what = f"the workers are lost ({type(error).__name__}: {said})" if said else "the scheduler or all workers are gone"
-            raise StudyError(f"{what}: what is finished is kept, {then}") from error
+            raise StudyError(f"{what}: what is finished is kept, go on with --resume") from error
 
 
 def _require_workers(client: "Client") -> None:
@@ -180,13 +180,6 @@ class ClusterPool:
                 f"idbench: all workers are gone; waiting {DESERTED:.0f} s for new ones; Ctrl-C keeps what there is\n"
             )
         return 0.0
-
-
-@contextmanager
-def cluster_pool(study: Study, scheduler: str | None, workers: int) -> Iterator[ClusterPool]:
-    """Give the workers of a scheduler, or without one as many new processes of this machine; raise StudyError."""
-    with connected(scheduler, workers, "go on with --resume") as client:
-        yield ClusterPool(study, client)
 
 
 def compute(text: str, first: int, stop: int, theirs: dict[str, str]) -> Shard:
