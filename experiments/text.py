@@ -120,12 +120,12 @@ def percent_reach(shares: npt.ArrayLike, most: float = np.inf) -> float:
     return float(np.clip(1.1 * known.max(), 0.01, 100.0)) if known.size else 100.0
 
 
-def of_each(said: Iterable[tuple[str, str]]) -> list[str]:
-    """Notes on logs, by their names, one line for those on several."""
+def of_each(said: Iterable[tuple[str, str]]) -> dict[str, str]:
+    """Lines that name the logs, or the joints, of each sentence, by the sentence."""
     names: dict[str, list[str]] = {}
     for name, words in said:
         names.setdefault(words, []).append(name)
-    return [f"{', '.join(of)}: {words}" for words, of in names.items()]
+    return {words: f"{', '.join(of)}: {words}" for words, of in names.items()}
 
 
 def new_table(title: str, columns: Iterable[str]) -> Table:

@@ -198,7 +198,7 @@ def prepared(
     if not logs[0].poses and (simulated := SimulatedLogs.of(every, request)):  # at the delays that were found
         every = [simulated.acting(read) for read in every]
     named = zip(every, _names(every), strict=True)
-    said = of_each((name, note) for one, name in named for note in one.notes) if len(every) > 1 else every[0].notes
+    said = of_each((name, note) for one, name in named for note in one.notes).values() if len(every) > 1 else every[0].notes
     return Loaded(request, tuple(every), tuple(dict.fromkeys([*said, *of_band])), simulated)
 
 
@@ -240,7 +240,7 @@ def judged_on(loaded: Loaded, every: Mapping[str, ReadLog], truth: Mapping[str, 
             raise ExperimentError(f"--validate {name} is of {kinds[0]}, what is identified of {kinds[1]}: give another log")
         if any(within(one.longest, log) for log in loaded.logs()):
             raise ExperimentError(f"--validate {name} holds the motion that is identified: give another motion, or none")
-    held_out, notes = {name: one.longest for name, one in every.items()}, (*loaded.notes, *of_each(said))
+    held_out, notes = {name: one.longest for name, one in every.items()}, (*loaded.notes, *of_each(said).values())
     gains = loaded.read[0].columns.gain
     return Logs(loaded.logs(), loaded.names, held_out, notes, truth, sought, gains)
 

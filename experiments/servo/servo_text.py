@@ -1,13 +1,13 @@
 """Servos as text."""
 
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 
 import numpy as np
 
 from idbench.experiments.document import Listing
 from idbench.experiments.judgement.held_out import FAIR, GOOD
 from idbench.experiments.servo.identification import unit_of
-from idbench.experiments.text import error_percentage, number
+from idbench.experiments.text import error_percentage, number, of_each
 from idbench.identify import Array
 from idbench.identify.arrays import TINY
 from idbench.identify.servo import ServoFit
@@ -77,15 +77,7 @@ def error_line(what: str, joint: str, errors: Array) -> str:
 def warnings_of(fits: Mapping[str, ServoFit | str], mistakes: Collection[str] = ()) -> list[str]:
     """Warnings, each once for all joints that it concerns; `mistakes` are joints of which one was proved."""
     every = ((joint, fit) for joint, fit in fits.items() if isinstance(fit, ServoFit))
-    return list(_grouped((joint, text) for joint, fit in every for text in _warnings(fit, joint in mistakes)).values())
-
-
-def _grouped(said: Iterable[tuple[str, str]]) -> dict[str, str]:
-    """Lines that name the joints of each sentence, by the sentence."""
-    joints = dict[str, list[str]]()
-    for joint, text in said:
-        joints.setdefault(text, []).append(joint)
-    return {text: f"{', '.join(of)}: {text}" for text, of in joints.items()}
+    return list(of_each((joint, text) for joint, fit in every for text in _warnings(fit, joint in mistakes)).values())
 
 
 def _warnings(fit: ServoFit, mistaken: bool) -> Iterator[str]:
@@ -155,8 +147,8 @@ def verdict_lines(
     words = [(joint, mistake_words(mistake)) for joint, mistake in mistakes.items()]
     alike = [(joint, text) for joint, fit in fits.items() if (text := confounded(fit))]
     lacks = [(joint, _lacks(fit)) for joint, fit in fits.items()]
-    rest = [("unsure", line) for lines in (words, alike, lacks) for line in _grouped(lines).values()]
-    return [*((word_of[why], line) for why, line in _grouped(said).items()), *rest]
+    rest = [("unsure", line) for lines in (words, alike, lacks) for line in of_each(lines).values()]
+    return [*((word_of[why], line) for why, line in of_each(said).items()), *rest]
 
 
 def mistake_words(mistake: ServoMistake) -> str:
