@@ -2,9 +2,11 @@
 
 import ast
 import inspect
+import tomllib
 from collections.abc import Callable
 from functools import cache, wraps
 from itertools import pairwise
+from pathlib import Path
 from textwrap import dedent
 from typing import Annotated, Any, TypeVar, dataclass_transform
 
@@ -71,6 +73,18 @@ def _reporting(init: Callable[..., None], cls: type) -> Callable[..., None]:
             raise ScenarioError("; ".join(complaints(error, cls))) from None
 
     return checked
+
+
+def read_toml(path: Path, what: str, raising: type[Exception] = ScenarioError) -> dict[str, Any]:
+    """Return the document of a file; an error says that `what` cannot be read."""
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise raising(f"cannot read {what} {path}: {error.strerror}") from error
+    except RecursionError as error:
+        raise raising(f"cannot read {path}: its tables are nested too deeply") from error
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise raising(f"cannot read {what} {path}: {error}") from error
 
 
 def make(cls: type, content: object, where: str) -> Any:

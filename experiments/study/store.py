@@ -20,7 +20,8 @@ from idbench.experiments.results.writing import replace_own
 from idbench.experiments.study.cluster import require_versions, versions
 from idbench.experiments.study.shard import Shard, parts_of
 from idbench.experiments.study.study import Study
-from idbench.experiments.study.study_file import read_toml, study_from
+from idbench.experiments.study.study_file import study_from
+from idbench.sim.settings import read_toml
 
 NAME = re.compile(r"runs-(\d{10})-(\d{10})\.parquet")
 
@@ -220,4 +221,4 @@ class Store:
 
 
 def _read(folder: Path) -> Study:
-    return study_from(read_toml(folder / "study.toml"), f"{folder / 'study.toml'}")
+    return study_from(read_toml(folder / "study.toml", "study", StudyError), f"{folder / 'study.toml'}")

@@ -1,7 +1,6 @@
 """Studies as TOML."""
 
 import json
-import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +10,7 @@ from idbench.experiments.study.study import Study
 from idbench.identify.plugins import did_you_mean
 from idbench.sim.errors import ScenarioError
 from idbench.sim.scenario.scenario_file import from_dict, load, to_dict
-from idbench.sim.settings import fields_of, make
+from idbench.sim.settings import fields_of, make, read_toml
 
 FOLDER = Path(__file__).parent.parent / "studies"
 
@@ -33,19 +32,7 @@ def load_study(name: str) -> Study:
         hint = did_you_mean(name, names())
         raise StudyError(f"no study {name!r}{hint}; known: {', '.join(names())}, or give the path of a TOML file (.toml)")
     path = Path(name) if name.endswith(".toml") else FOLDER / f"{name}.toml"
-    return study_from(read_toml(path), f"study {name}")
-
-
-def read_toml(path: Path) -> dict[str, Any]:
-    """Return the document of a study."""
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise StudyError(f"cannot read study {path}: {error.strerror}") from error
-    except RecursionError as error:
-        raise StudyError(f"cannot read {path}: its tables are nested too deeply") from error
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise StudyError(f"cannot read study {path}: {error}") from error
+    return study_from(read_toml(path, "study", StudyError), f"study {name}")
 
 
 def study_from(content: dict[str, Any], what: str) -> Study:

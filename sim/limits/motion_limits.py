@@ -1,6 +1,5 @@
 """What a robot may do: from its file, and from limits.toml."""
 
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -14,7 +13,7 @@ from idbench.identify.plugins import did_you_mean
 from idbench.sim.errors import ScenarioError
 from idbench.sim.robot.motors import Array
 from idbench.sim.robot.robot import Robot
-from idbench.sim.settings import EachPositiveOrNone, Number, Positive, Share, make, per_joint, settings
+from idbench.sim.settings import EachPositiveOrNone, Number, Positive, Share, make, per_joint, read_toml, settings
 
 Point = tuple[Number, Number, Number]
 
@@ -90,12 +89,7 @@ class MotionLimits:
         """
         if path is None:
             return cls()
-        try:
-            content = tomllib.loads(path.read_text(encoding="utf-8"))
-        except OSError as error:
-            raise ScenarioError(f"cannot read limits {path}: {error.strerror}") from error
-        except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-            raise ScenarioError(f"cannot read limits {path}: {error}") from error
+        content = read_toml(path, "limits")
         if isinstance(content.get("keep_out"), dict):
             raise ScenarioError(f"limits {path}: write [[keep_out]], with double brackets, for each box")
         found: MotionLimits = make(cls, content, "")

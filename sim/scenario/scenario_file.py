@@ -1,6 +1,5 @@
 """Scenarios as TOML: read with every key checked, written with every key explained."""
 
-import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import fields, is_dataclass
 from pathlib import Path
@@ -15,7 +14,7 @@ from idbench.sim.encoders import ENCODERS
 from idbench.sim.errors import ScenarioError
 from idbench.sim.frictions import FRICTIONS
 from idbench.sim.scenario.scenario import Scenario
-from idbench.sim.settings import description, for_all_joints, limits, make
+from idbench.sim.settings import description, for_all_joints, limits, make, read_toml
 from idbench.sim.trajectories import TRAJECTORIES
 
 LONGEST = 1500  # Letters from which on a table comes after the others
@@ -74,14 +73,7 @@ def _content(name: str) -> dict[str, Any]:
     if not name.endswith(".toml") and name not in (*names(), *designed()):
         hint = did_you_mean(name, (*names(), *designed()))
         raise ScenarioError(f"no scenario {name!r}{hint}; known: {', '.join(names())}, or give the path of a TOML file (.toml)")
-    try:
-        return tomllib.loads(path.read_text())
-    except OSError as error:
-        raise ScenarioError(f"cannot read scenario {path}: {error.strerror}") from error
-    except RecursionError as error:
-        raise ScenarioError(f"cannot read {path}: its tables are nested too deeply") from error
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise ScenarioError(f"cannot read scenario {path}: {error}") from error
+    return read_toml(path, "scenario")
 
 
 def from_dict(content: Mapping[str, Any]) -> Scenario:
