@@ -25,8 +25,6 @@ class Windings(NamedTuple):
     """Current [A]."""
     sum: Array
     """Of the loop's integrator [V]."""
-    electrical: Array
-    """Energy that came in at the terminals [J]."""
 
 
 class PeriodTable(NamedTuple):
@@ -35,8 +33,8 @@ class PeriodTable(NamedTuple):
     least: float
     highest: int
     linear: Array
-    """Charge, electrical energy and currents at edges while a current keeps its sign: (sign, value, joint) -> (constant, by i,
-    by e) x quantity."""
+    """Charge and currents at edges while a current keeps its sign: (sign, value, joint) -> (constant, by i, by e) x
+    quantity."""
     pieces: Array
     """Duration, voltages ahead and behind [bus voltages], and what is kept of the current, (value, piece, joint, 4)."""
     V: Array

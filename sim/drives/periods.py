@@ -18,9 +18,9 @@ def _over_zero(i: float, goal: float, dt: float, onward: float, rate: float) -> 
 
 
 @compiled
-def _careful(i: float, pieces: Array, e: float, V: float, R: float, L: float) -> tuple[float, float, float]:
-    """Return the passage of a current that may change its sign: current [A], charge [A s] and energy [J]."""
-    total, electrical = 0.0, 0.0
+def _careful(i: float, pieces: Array, e: float, V: float, R: float, L: float) -> tuple[float, float]:
+    """Return the passage of a current that may change its sign: current [A] and charge [A s]."""
+    total = 0.0
     share, rate = L / R, R / L
     for k in range(len(pieces)):
         dt, forward, backward, kept = pieces[k]
@@ -30,30 +30,25 @@ def _careful(i: float, pieces: Array, e: float, V: float, R: float, L: float) ->
         if ahead != behind and i * end <= 0.0:
             onward = max(ahead, 0.0) + min(behind, 0.0)
             rest, end = _over_zero(i, goal, dt, onward, rate)
-            charge = goal * (dt - rest) + (i - 0.0) * share
-            total += charge
-            electrical += (goal * R + e) * charge
+            total += goal * (dt - rest) + (i - 0.0) * share
             i = 0.0
             goal, dt = onward, rest
-        charge = goal * dt + (i - end) * share
-        total += charge
-        electrical += (goal * R + e) * charge
+        total += goal * dt + (i - end) * share
         i = end
-    return i, total, electrical
+    return i, total
 
 
 @compiled
-def _passage(table: PeriodTable, joint: int, i: float, value: int, e: float) -> tuple[float, float, float]:
-    """Return current [A], charge [A s] and energy [J] of a period: constant + by_i i + by_e e, while i keeps its sign."""
+def _passage(table: PeriodTable, joint: int, i: float, value: int, e: float) -> tuple[float, float]:
+    """Return current [A] and charge [A s] of a period: constant + by_i i + by_e e, while i keeps its sign."""
     found = table.linear[1 if i > 0.0 else 0, value, joint]
     last = found.shape[1] - 1
     now = 0.0
-    for edge in range(2, last + 1):
+    for edge in range(1, last + 1):
         now = found[0, edge] + found[1, edge] * i + found[2, edge] * e
         if table.has_dead_time and now * i <= 0.0:
             return _careful(i, table.pieces[value, :, joint], e, table.V[joint], table.R[joint], table.L[joint])
-    charge = found[0, 0] + found[1, 0] * i + found[2, 0] * e
-    return now, charge, found[0, 1] + found[1, 1] * i + found[2, 1] * e
+    return now, found[0, 0] + found[1, 0] * i + found[2, 0] * e
 
 
 @compiled
@@ -82,7 +77,6 @@ def periods(table: PeriodTable, loops: Loops, windings: Windings, wanted: Array,
             kp, ki = loops.kp[sim, joint], loops.ki[sim, joint]
             most = loops.most[sim, joint]
             i, total = windings.i[sim, joint], windings.sum[sim, joint]
-            electrical = windings.electrical[sim, joint]
             for k in range(len(emf)):
                 e = emf[k, sim, joint]
                 error = wanted[sim, joint] - i
@@ -94,12 +88,10 @@ def periods(table: PeriodTable, loops: Loops, windings: Windings, wanted: Array,
                 done[1, k, sim, joint] = i
                 done[3, k, sim, joint] = steps * table.least
                 if math.isfinite(asked) and math.isfinite(e):
-                    i, charge, energy = _passage(table, joint, i, int(steps) + table.highest, e)
+                    i, charge = _passage(table, joint, i, int(steps) + table.highest, e)
                 else:  # the simulation then fails, and says so
-                    i = charge = energy = math.nan
-                electrical += energy
+                    i = charge = math.nan
                 done[0, k, sim, joint] = charge
                 done[2, k, sim, joint] = i
             windings.i[sim, joint], windings.sum[sim, joint] = i, total
-            windings.electrical[sim, joint] = electrical
     return done

@@ -43,9 +43,8 @@ class ExactPassages:
             windings.sum[:] += loops.ki * error * (v == asked)
             m = v / self.winding.V
             index[k], before[k] = np.rint(m / self.least) * self.least if self.least else m, windings.i
-            after[k], charge[k], electrical = pass_period(windings.i, index[k], e, self.winding, self.modulator)
+            after[k], charge[k] = pass_period(windings.i, index[k], e, self.winding, self.modulator)
             windings.i[:] = after[k]
-            windings.electrical[:] += electrical
         return done
 
 
@@ -101,7 +100,7 @@ class TabulatedPassages:
 
     @cached_property
     def _table(self) -> Array:
-        """Charge, electrical energy and the currents at edges, (sign, value, joint) -> (constant, by i, by e) x quantity."""
+        """Charge and the currents at edges, (sign, value, joint) -> (constant, by i, by e) x quantity."""
         V: Array = self.winding.V[0]
         shape = 2, self._values, len(V)
         winding = Winding(*(np.broadcast_to(x[0], shape) for x in self.winding))
@@ -110,7 +109,7 @@ class TabulatedPassages:
         made = []
         for i, e in ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0)):
             passage, edges = straight(np.full(shape, i), np.full(shape, e), winding, pattern, self.modulator.period)
-            made.append(np.stack([passage.charge, passage.electrical, *edges], axis=-1))
+            made.append(np.stack([passage.charge, *edges], axis=-1))
         constant, by_i, by_e = (np.asarray(each, dtype=np.float64) for each in made)
         table: Array = np.array([constant, by_i - constant, by_e - constant])
         return np.moveaxis(table, 0, -2).reshape(-1, 3, constant.shape[-1])
@@ -189,10 +188,7 @@ class SwitchedDrive(AbstractDrive):
 
 
 class SwitchedAmplifier(AbstractAmplifier):
-    """The chopper at work.
-
-    `mechanical` counts what went to the rotors [J], shape (sim, joint).
-    """
+    """The chopper at work."""
 
     def __init__(self, settings: SwitchedDrive, motors: Motors, V: Array, I: Array, nsim: int, h: float) -> None:  # noqa: E741
         R, L, K, V, self._I = (every(x, nsim) for x in (motors.R, motors.L, motors.K, V, I))
@@ -206,18 +202,7 @@ class SwitchedAmplifier(AbstractAmplifier):
         most = 1 - 4 * settings.dead_time / h
         self._most = (np.floor(most / least) * least if least else most) * V
         self._loops = Loops(kp, kp * lost, self._most, settings.emf_compensation)
-        *state, self.mechanical = np.zeros((4, *V.shape))
-        self._windings = Windings(*state)
-
-    @property
-    def i(self) -> Array:
-        """Currents [A], shape (sim, joint)."""
-        return self._windings.i
-
-    @property
-    def electrical(self) -> Array:
-        """What came in at the terminals [J], shape (sim, joint)."""
-        return self._windings.electrical
+        self._windings = Windings(*np.zeros((2, *V.shape)))
 
     def step(self, demand: Array, speed: Array, steps: int) -> Array:
         """Advance by PWM periods; return the mean torque in each."""
@@ -225,7 +210,6 @@ class SwitchedAmplifier(AbstractAmplifier):
         e = self._K * speed
         charge, before, after, index = self._passages.advance(self._loops, self._windings, wanted, e)
         self.trace = wanted, charge, before, after, e, index
-        self.mechanical += (e * charge).sum(axis=0)
         return charge * (self._K / self._h)
 
     def electric(self, trace: Trace, dt: Array) -> Electric:
@@ -250,8 +234,3 @@ class SwitchedAmplifier(AbstractAmplifier):
         return BetweenEdges(*(
             np.swapaxes(x, 0, 1).reshape(-1, *before.shape) for x in (begins + since, current, voltage)
         ))  # fmt: skip
-
-    @property
-    def copper(self) -> Array:
-        """What became heat [J]: what came in, less what went to the rotor and what is stored, L i^2 / 2."""
-        return self.electrical - self.mechanical - self._winding.L / 2 * self.i**2

@@ -29,9 +29,6 @@ class Passage(NamedTuple):
     charge: Array
     """Integral of the current [A s]."""
 
-    electrical: Array
-    """Energy that came in at the terminals [J]."""
-
 
 def pass_period(i: Array, m: Array, e: Array, winding: Winding, modulator: Modulator) -> Passage:
     """Return the passage of a winding through a PWM period.
@@ -67,19 +64,15 @@ def straight(i: Array, e: Array, winding: Winding, pattern: Pattern, period: flo
     edges = []
     t, rest = np.zeros(1), (pattern.base * V - e) / R
     push = np.full(i.shape, pattern.base * period)  # volt-seconds, in bus voltages
-    extra = np.zeros_like(i)  # charge of the pulses, times their level
     for pulse in pattern.pulses:
         before = rest + (now - rest) * np.exp(rate * (t - pulse.start))
         goal, dt = (pulse.level * V - e) / R, pulse.end - pulse.start
         now = goal + (before - goal) * np.exp(-rate * dt)
         t = pulse.end
-        above = pulse.level - pattern.base
-        push = push + above * dt
-        extra += above * (goal * dt + (before - now) / rate)
+        push = push + (pulse.level - pattern.base) * dt
         edges += [before, now]
     after = rest + (now - rest) * np.exp(rate * (t - period))
-    charge = (push * V - e * period - L * (after - i)) / R
-    return Passage(after, charge, V * (pattern.base * charge + extra)), np.array([*edges, after])
+    return Passage(after, (push * V - e * period - L * (after - i)) / R), np.array([*edges, after])
 
 
 class WindingStretch(NamedTuple):
@@ -93,12 +86,10 @@ class WindingStretch(NamedTuple):
 
 def step_by_step(i: Array, e: Array, winding: Winding, period: Pieces) -> Passage:
     """Return the passage of a current that may change its sign; all arrays have the shape (winding,)."""
-    _, R, L = winding
     start, end, goal, dt = stretches(i, e, winding, period)
-    charge = goal * dt + (start - end) * (L / R)
+    charge = goal * dt + (start - end) * (winding.L / winding.R)
     # In the order of time: empty stretches, which others need, change no bit.
-    total, electrical = (np.add.accumulate(x, axis=0)[-1] for x in (charge, (goal * R + e) * charge))
-    return Passage(end[-1], total, electrical)
+    return Passage(end[-1], np.add.accumulate(charge, axis=0)[-1])
 
 
 def stretches(i: Array, e: Array, winding: Winding, period: Pieces) -> WindingStretch:
