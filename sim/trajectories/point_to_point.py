@@ -1,17 +1,14 @@
 """Fifth-order point-to-point trajectories, in closed form."""
 
 from dataclasses import dataclass
-from typing import Self
 
 import numpy as np
-import numpy.typing as npt
 
 from idbench.sim.errors import ScenarioError
 from idbench.sim.robot.motors import Array
 from idbench.sim.trajectories.trajectory import AbstractMotion, Reference
 
 PEAK_VELOCITY = 15 / 8  # Largest |ds/du| of s(u) = 10 u^3 - 15 u^4 + 6 u^5, at u = 1/2
-PEAK_ACCELERATION = 10 / np.sqrt(3)  # Largest |d2s/du2| of s(u), at u = 1/2 - 1/sqrt(12)
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,33 +48,6 @@ class PointToPoint(AbstractMotion):
             raise ScenarioError(
                 f"durations must be above 0 s and dwells not below: {self.durations.min():g}, {self.dwells.min():g}"
             )
-
-    @classmethod
-    def fastest(
-        cls, waypoints: npt.ArrayLike, velocity: npt.ArrayLike, acceleration: npt.ArrayLike, dwells: npt.ArrayLike
-    ) -> Self:
-        """Return the shortest moves that keep the joints' velocity [rad/s] and acceleration [rad/s^2] limits.
-
-        Parameters
-        ----------
-        waypoints, dwells
-            As for the class.
-        velocity, acceleration : array_like, shape (joint,)
-            Limits, above zero.
-
-        Raises
-        ------
-        ScenarioError
-            As for the class; also if two consecutive waypoints are equal, or a limit is not above zero.
-        """
-        limits = np.broadcast_to(velocity, np.shape(waypoints)[-1:]), np.broadcast_to(acceleration, np.shape(waypoints)[-1:])
-        if not all((limit > 0).all() for limit in limits):
-            raise ScenarioError(f"velocity and acceleration limits must be above 0: {limits[0]}, {limits[1]}")
-        change = np.abs(np.diff(np.asarray(waypoints, dtype=np.float64), axis=0))
-        by_velocity = PEAK_VELOCITY * change / limits[0]
-        by_acceleration = np.sqrt(PEAK_ACCELERATION * change / limits[1])
-        durations = np.maximum(by_velocity, by_acceleration).max(axis=1)
-        return cls(np.asarray(waypoints), durations, np.asarray(dwells))
 
     @property
     def duration(self) -> float:
