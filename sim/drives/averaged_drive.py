@@ -1,5 +1,7 @@
 """A current-controlled DC motor, its chopper averaged away."""
 
+from typing import ClassVar
+
 import numpy as np
 
 from idbench.sim.drives.drive import AbstractAmplifier, AbstractDrive, Electric, Trace, every
@@ -29,6 +31,8 @@ class AveragedDrive(AbstractDrive):
     middle of a stretch: the first physics step of a command, and the rest of its period.
     """
 
+    steady: ClassVar[bool] = True
+
     bandwidth: Positive = 1000.0
     """Bandwidth of the current loop, w / (2 pi) [Hz]."""
     bus_voltage: EachPositiveOrNone = None
@@ -44,11 +48,6 @@ class AveragedDrive(AbstractDrive):
     def lag(self, robot: Robot) -> Array:
         """Return 1 / w."""
         return np.full(robot.n, 1 / (2 * np.pi * self.bandwidth))
-
-    @property
-    def steady(self) -> bool:
-        """True."""
-        return True
 
 
 class _Amplifier(AbstractAmplifier):

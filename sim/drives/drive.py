@@ -109,6 +109,9 @@ class AbstractDrive(ABC):
     has_own_motors: ClassVar[bool] = False
     """Whether it needs none of the robot's motors (dcmotor elements of its file)."""
 
+    steady: ClassVar[bool] = False
+    """Whether the torque, once the first step of a command is over, may be taken as one mean for any number of steps."""
+
     @abstractmethod
     def start(self, robot: Robot, nsim: int, h: float) -> AbstractAmplifier:
         """Return the drive at rest, to be advanced by physics steps of `h` [s].
@@ -148,11 +151,6 @@ class AbstractDrive(ABC):
     @abstractmethod
     def lag(self, robot: Robot) -> Array:
         """Lag of the torque behind a slow command [s], shape (joint,)."""
-
-    @property
-    @abstractmethod
-    def steady(self) -> bool:
-        """Whether the torque, once the first step of a command is over, may be taken as one mean for any number of steps."""
 
     def step_length(self, fs: float, longest: float) -> float:
         """Return the physics step [s] that fits whole times into a sample of 1/`fs` and is not above `longest`."""

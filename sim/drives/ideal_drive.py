@@ -15,6 +15,7 @@ class IdealDrive(AbstractDrive):
     """Torque as asked: no winding, no limit, no lag."""
 
     has_own_motors: ClassVar[bool] = True
+    steady: ClassVar[bool] = True
 
     def start(self, robot: Robot, nsim: int, h: float) -> AbstractAmplifier:
         """Return the drive."""
@@ -23,11 +24,6 @@ class IdealDrive(AbstractDrive):
     def lag(self, robot: Robot) -> Array:
         """Return zeros."""
         return np.zeros(robot.n)
-
-    @property
-    def steady(self) -> bool:
-        """True."""
-        return True
 
 
 class _Amplifier(AbstractAmplifier):

@@ -107,11 +107,6 @@ class ServoDrive(AbstractDrive):
         """Whether the encoder is at the rotor."""
         return self.sensed == "rotor"
 
-    @property
-    def steady(self) -> bool:
-        """False: the loop is closed at every step."""
-        return False
-
     def enabled(self, t: Array) -> Array:
         """Return 1 where torque is on and 0 where it is off, at the instants t [s]."""
         return np.where(self.is_off(t), np.zeros_like(t), 1.0)

@@ -166,11 +166,6 @@ class SwitchedDrive(AbstractDrive):
         T = 1 / self.pwm
         return np.full(robot.n, T / -np.expm1(-2 * np.pi * self.bandwidth * T) - T / 2)
 
-    @property
-    def steady(self) -> bool:
-        """False: every PWM period is a step of its own."""
-        return False
-
     def step_length(self, fs: float, longest: float) -> float:
         """Return the PWM period [s].
 

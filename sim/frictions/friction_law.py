@@ -2,7 +2,7 @@
 
 from abc import ABC, abstractmethod
 from dataclasses import field
-from typing import final
+from typing import ClassVar, final
 
 import mujoco
 from mujoco.batch import Batch
@@ -33,15 +33,13 @@ class AbstractContact(ABC):
 class AbstractFrictionLaw(ABC):
     """The settings of a friction; all have Fv and Fs."""
 
+    steady: ClassVar[bool] = False
+    """Whether MuJoCo alone makes the friction, so that many physics steps may be taken at once; not by default."""
+
     viscous: EachNotNegativeOrNone = field(default=None, kw_only=True)
     """Fv [N m s/rad], of all joints or of each; without it the robot's own."""
     coulomb: EachNotNegativeOrNone = field(default=None, kw_only=True)
     """Fs [N m], of all joints or of each; without it the robot's own."""
-
-    @property
-    def steady(self) -> bool:
-        """Whether MuJoCo alone makes the friction, so that many physics steps may be taken at once; not by default."""
-        return False
 
     @final
     def edit(self, spec: mujoco.MjSpec) -> None:

@@ -1,7 +1,7 @@
 """Frictions that depend on the motion, the load or the temperature alone, not on what was before."""
 
 from dataclasses import field, fields, is_dataclass
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
 from mujoco.batch import Batch
@@ -25,10 +25,7 @@ SLOW, JUMP = 1e-9, 1e-6
 class CoulombViscous(AbstractFrictionLaw):
     """Fs sign(qd) + Fv qd; near standstill MuJoCo's soft constraint decides."""
 
-    @property
-    def steady(self) -> bool:
-        """True."""
-        return True
+    steady: ClassVar[bool] = True
 
     def start(self, plant: Batch, Fs: Array, h: float) -> AbstractContact:
         """Return nothing more than MuJoCo's."""

@@ -23,11 +23,6 @@ class Starter(AbstractDrive):
         """Return the time constant, by which the torque follows a slow command [s]."""
         return np.full(robot.n, self.time_constant)
 
-    @property
-    def steady(self) -> bool:
-        """False: the torque changes from step to step."""
-        return False
-
 
 class _Amplifier(AbstractAmplifier):
     def __init__(self, tau: Array, share: float) -> None:
