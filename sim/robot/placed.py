@@ -1,7 +1,7 @@
 """A robot as links that hang on each other, as files of other simulators describe it: a link's frame is at its joint's axis."""
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -29,16 +29,16 @@ class Body:
         """Return the body of a link, its frame at an origin in that of the tree; None if it has none."""
         if named("M", j) not in standard:
             return None
-        xx, xy, xz, yy, yz, zz, *first, mass = (standard[named(x, j)] for x in INERTIAL)
+        body = cls.with_values(standard[named(x, j)] for x in INERTIAL)
+        return body if origin is None else replace(body, centre=body.centre - origin)
+
+    @classmethod
+    def with_values(cls, values: Iterable[float]) -> "Body":
+        """Return the body of XX XY XZ YY YZ ZZ about the origin of a frame, first moments and mass."""
+        xx, xy, xz, yy, yz, zz, *first, mass = values
         centre = np.array(first) / mass if mass > 0 else np.zeros(3)
         about = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-        inertia = about - mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
-        return cls(float(mass), centre if origin is None else centre - origin, inertia)
-
-    @property
-    def six(self) -> list[float]:
-        """Inertia: xx, xy, xz, yy, yz, zz."""
-        return [float(x) for x in without_rounding(self.inertia[np.triu_indices(3)])]
+        return cls(float(mass), centre, about - mass * (centre @ centre * np.eye(3) - np.outer(centre, centre)))
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 from xml.parsers import expat
@@ -11,13 +12,13 @@ import numpy as np
 import numpy.typing as npt
 
 from idbench.identify.basis.block import named
-from idbench.identify.data.kinematics import INERTIAL
 from idbench.sim.errors import RobotError
 from idbench.sim.robot.dh import TABLE
 from idbench.sim.robot.motors import Array
 from idbench.sim.robot.mounting import PLAIN, Mounting
 from idbench.sim.robot.opened import drop_ties, hold_bases
 from idbench.sim.robot.payload import without_missing_meshes
+from idbench.sim.robot.placed import Body
 from idbench.sim.robot.robot import Robot
 from idbench.sim.robot.tree import kinematic_tree, standard_parameters
 
@@ -64,14 +65,10 @@ def rewritten(name: str, standard: Values, folder: Path | None = None, mounting:
         for letters, attribute in DRIVE.items():
             if named(letters, j) in wanted:
                 joint.set(attribute, repr(float(wanted[named(letters, j)])))
-        if named("M", j) in wanted:
-            _set_link(robot, bodies, j, wanted)
-    home = Robot.path(name).absolute().parent
-    if folder is not None:
-        _relocate(root, home, folder)
-    text = ElementTree.tostring(root, encoding="unicode")
-    text = text if _made(Robot.path(name)) else _around(name, text)
-    _require_same(name, compiled(name, text, folder or home), wanted)
+        if (body := Body.of(wanted, j)) is not None:
+            _set_link(robot, bodies, j, body)
+    text, made = _finished(name, root, folder)
+    _require_same(name, made, wanted)
     return text
 
 
@@ -99,19 +96,18 @@ def with_body(name: str, body: str, values: Array, folder: Path | None = None, m
     if any(element.get("name") == body for element in root.iter("body")):
         raise RobotError(f"the file of robot {robot.name!r} has a body {body!r} already")
     link = _elements(root)[0][int(robot.model.jnt_bodyid[robot.n - 1])]
-    xx, xy, xz, yy, yz, zz, *first, mass = (float(x) for x in values)
-    centre = np.array(first) / mass
-    about = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) - mass * (
-        centre @ centre * np.eye(3) - np.outer(centre, centre)
-    )
-    _give(ElementTree.SubElement(link, "body", {"name": body}), mass, centre, about)
+    _give(ElementTree.SubElement(link, "body", {"name": body}), Body.with_values(values.tolist()))
+    return _finished(name, root, folder)[0]
+
+
+def _finished(name: str, root: ElementTree.Element, folder: Path | None) -> tuple[str, Robot]:
+    """Return the text of a robot's file that was changed, for a folder, and the robot that it compiles to."""
     home = Robot.path(name).absolute().parent
     if folder is not None:
         _relocate(root, home, folder)
     text = ElementTree.tostring(root, encoding="unicode")
     text = text if _made(Robot.path(name)) else _around(name, text)
-    compiled(name, text, folder or home)
-    return text
+    return text, compiled(name, text, folder or home)
 
 
 def compiled(name: str, text: str, folder: Path | None = None) -> Robot:
@@ -162,7 +158,7 @@ def _document(name: str, mounting: Mounting) -> ElementTree.Element:
     """Return a robot's file as MJCF, its inclusions in their places."""
     path = Robot.path(name)
     if _made(path) or not mounting.plain:
-        spec = Robot.spec(name)
+        spec, _ = Robot.described(name)
         mounting.edit(spec)
         _ = list(drop_ties(spec))
         spec.compile()
@@ -221,28 +217,25 @@ def _set_tendons(robot: Robot, root: ElementTree.Element, wanted: Values) -> Non
                 tendon.set(attribute, repr(float(wanted[name])))
 
 
-def _set_link(robot: Robot, bodies: list[ElementTree.Element], joint: int, wanted: Values) -> None:
+def _set_link(robot: Robot, bodies: list[ElementTree.Element], joint: int, whole: Body) -> None:
     """Give a link its mass, centre of mass and inertia, and the bodies welded to it none."""
     model, link = robot.model, int(robot.model.jnt_bodyid[joint])
-    xx, xy, xz, yy, yz, zz, *first, mass = (wanted[f"{x}{joint + 1}"] for x in INERTIAL)
-    centre = np.array(first) / mass if mass > 0 else np.zeros(3)
-    about_origin = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    inertia = about_origin - mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
-    if mass <= 0 or np.linalg.eigvalsh(np.trace(inertia) / 2 * np.eye(3) - inertia)[0] < 0:
-        raise RobotError(f"link {joint + 1} with a mass of {mass:.4g} kg and this inertia is not physically consistent")
+    inertia = whole.inertia
+    if whole.mass <= 0 or np.linalg.eigvalsh(np.trace(inertia) / 2 * np.eye(3) - inertia)[0] < 0:
+        raise RobotError(f"link {joint + 1} with a mass of {whole.mass:.4g} kg and this inertia is not physically consistent")
     for body in range(link, model.nbody):
         if model.body_weldid[body] == link:
-            _give(bodies[body], mass * (body == link), centre, inertia * (body == link))
+            _give(bodies[body], whole if body == link else replace(whole, mass=0.0))
 
 
-def _give(body: ElementTree.Element, mass: float, centre: Array, inertia: Array) -> None:
-    for old in body.findall("inertial"):
-        body.remove(old)
-    six = [*np.diagonal(inertia), inertia[0, 1], inertia[0, 2], inertia[1, 2]]
-    kind = {"fullinertia": _numbers(six)} if mass else {"diaginertia": "0 0 0"}
-    made = ElementTree.Element("inertial", {"pos": _numbers(centre), "mass": repr(float(mass)), **kind})
-    made.tail = body.text
-    body.insert(0, made)
+def _give(element: ElementTree.Element, body: Body) -> None:
+    for old in element.findall("inertial"):
+        element.remove(old)
+    I = body.inertia  # noqa: E741
+    kind = {"fullinertia": _numbers([*np.diagonal(I), I[0, 1], I[0, 2], I[1, 2]])} if body.mass else {"diaginertia": "0 0 0"}
+    made = ElementTree.Element("inertial", {"pos": _numbers(body.centre), "mass": repr(body.mass), **kind})
+    made.tail = element.text
+    element.insert(0, made)
 
 
 def _numbers(values: npt.ArrayLike) -> str:

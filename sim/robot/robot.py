@@ -98,11 +98,6 @@ class Robot:
             raise RobotError(f"{error.args[0]}{hint}, or give the path of an MJCF or URDF file ({', '.join(FILES)})") from None
 
     @staticmethod
-    def spec(name: str) -> mujoco.MjSpec:
-        """Return the description of the robot that ships as `name`, or of a file, to be edited and compiled."""
-        return Robot.described(name)[0]
-
-    @staticmethod
     def described(name: str) -> tuple[mujoco.MjSpec, tuple[str, ...]]:
         """Return the description of a robot, to be edited and compiled, and what was mended in its file.
 

@@ -18,6 +18,9 @@ TINY = 1e-12  # Second moment [kg m^2] below which MuJoCo takes it for none
 ROTOR_INERTIA, GEAR_RATIO = "drake:rotor_inertia", "drake:gear_ratio"
 """What Drake reads of a motor: inertia of its rotor [kg m^2], and turns of it for one of the joint."""
 
+SIX = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+"""What the numbers of an inertia matrix are called."""
+
 ROUND, LEAST = 1e-9, 1e-3
 """Share of the largest second moment above which the least is one that a body has; and to which others are raised."""
 
@@ -123,7 +126,7 @@ def _require_plain(root: ElementTree.Element) -> None:
 def _mend(root: ElementTree.Element) -> Iterator[str]:
     """Give links inertias that can exist; yield what was done."""
     links = {link.get("name", ""): link for link in root.iter("link")}
-    moving = {_name(joint, "child") for joint in root.iter("joint") if joint.get("type") != "fixed"}
+    moving = {link_of(joint, "child") for joint in root.iter("joint") if joint.get("type") != "fixed"}
     missing, impossible = list[str](), list[str]()
     for name, link in links.items():
         inertial = link.find("inertial")
@@ -132,14 +135,14 @@ def _mend(root: ElementTree.Element) -> Iterator[str]:
             inertial = None
         if inertial is None:
             if name in moving and not _carries(name, links, root):
-                _give(link, SMALL, {}, np.eye(3) * SMALL * SIZE**2)
+                give_inertial(link, SMALL, {}, np.eye(3) * SMALL * SIZE**2)
                 missing.append(name)
             continue
         given = _inertia(inertial)
         if (possible := _possible(given, _mass(inertial))) is not given:
             origin = inertial.find("origin")
             link.remove(inertial)
-            _give(link, _mass(inertial), {} if origin is None else origin.attrib, possible)
+            give_inertial(link, _mass(inertial), {} if origin is None else origin.attrib, possible)
             impossible.append(name)
     if missing:
         yield f"no inertia of {', '.join(missing)}: 1 g is assumed, which matters only for simulation"
@@ -149,7 +152,7 @@ def _mend(root: ElementTree.Element) -> Iterator[str]:
 
 def _carries(name: str, links: dict[str, ElementTree.Element], root: ElementTree.Element) -> bool:
     """True if something with mass is welded to a link."""
-    welded = [_name(j, "child") for j in root.iter("joint") if j.get("type") == "fixed" and _name(j, "parent") == name]
+    welded = [link_of(j, "child") for j in root.iter("joint") if j.get("type") == "fixed" and link_of(j, "parent") == name]
     for child in welded:
         inertial = links[child].find("inertial") if child in links else None
         if (inertial is not None and _mass(inertial) > 0) or _carries(child, links, root):
@@ -157,7 +160,8 @@ def _carries(name: str, links: dict[str, ElementTree.Element], root: ElementTree
     return False
 
 
-def _name(joint: ElementTree.Element, end: str) -> str:
+def link_of(joint: ElementTree.Element, end: str) -> str:
+    """Name of the parent or child of a joint; empty without one."""
     found = joint.find(end)
     return "" if found is None else found.get("link", "")
 
@@ -171,7 +175,7 @@ def _inertia(inertial: ElementTree.Element) -> Array:
     """Return the matrix of inertia, in the axes of its origin."""
     found = inertial.find("inertia")
     values = {} if found is None else found.attrib
-    xx, xy, xz, yy, yz, zz = (float(values.get(f"i{x}", 0)) for x in ("xx", "xy", "xz", "yy", "yz", "zz"))
+    xx, xy, xz, yy, yz, zz = (float(values.get(x, 0)) for x in SIX)
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
@@ -186,10 +190,10 @@ def _possible(inertia: Array, mass: float) -> Array:
     return np.asarray(np.trace(made) * np.eye(3) - made)
 
 
-def _give(link: ElementTree.Element, mass: float, origin: Mapping[str, str], inertia: Array) -> None:
+def give_inertial(link: ElementTree.Element, mass: float, origin: Mapping[str, str], inertia: Array) -> None:
+    """Give a link a mass, the place of its centre, and an inertia matrix about it, shape (3, 3)."""
     inertial = ElementTree.SubElement(link, "inertial")
     ElementTree.SubElement(inertial, "origin", {"xyz": "0 0 0", "rpy": "0 0 0", **origin})
     ElementTree.SubElement(inertial, "mass", {"value": repr(float(mass))})
-    names = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
-    values = zip(names, inertia[np.triu_indices(3)], strict=True)
+    values = zip(SIX, inertia[np.triu_indices(3)], strict=True)
     ElementTree.SubElement(inertial, "inertia", {name: repr(float(value)) for name, value in values})

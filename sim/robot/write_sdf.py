@@ -6,12 +6,14 @@ from xml.etree import ElementTree
 import numpy as np
 
 from idbench.identify.data.kinematics import KinematicTree
-from idbench.sim.robot.placed import BASE, PlacedLink, numbers, placed_links
+from idbench.sim.robot.placed import BASE, Body, PlacedLink, numbers, placed_links, without_rounding
 from idbench.sim.robot.robot import Robot
-from idbench.sim.robot.urdf import GEAR_RATIO, ROTOR_INERTIA, SIZE, SMALL
+from idbench.sim.robot.urdf import GEAR_RATIO, ROTOR_INERTIA, SIX, SIZE, SMALL
 from idbench.sim.robot.write_urdf import DRAKE
 
 VERSION = "1.9"  # Of the format
+
+BALL = Body(SMALL, np.zeros(3), np.eye(3) * SMALL * SIZE**2)  # What a link without mass gets
 
 
 def sdf_text(robot: Robot, tree: KinematicTree, standard: Mapping[str, float]) -> str:
@@ -36,20 +38,13 @@ def _link(model: ElementTree.Element, link: PlacedLink) -> None:
     element = ElementTree.SubElement(model, "link", {"name": link.name})
     pose = _text(element, "pose", numbers(np.concatenate([link.place, link.angles])))
     pose.set("relative_to", link.parent)
-    body = link.body
-    some = body is not None and body.mass > 0
-    centre, mass, six = (body.centre, body.mass, body.six) if some and body else (np.zeros(3), SMALL, _ball())
+    body = link.body if link.body is not None and link.body.mass > 0 else BALL
     inertial = ElementTree.SubElement(element, "inertial")
-    _text(inertial, "pose", numbers(np.concatenate([centre, np.zeros(3)])))
-    _text(inertial, "mass", repr(mass))
+    _text(inertial, "pose", numbers(np.concatenate([body.centre, np.zeros(3)])))
+    _text(inertial, "mass", repr(body.mass))
     inertia = ElementTree.SubElement(inertial, "inertia")
-    for name, x in zip(("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), six, strict=True):
-        _text(inertia, name, repr(x))
-
-
-def _ball() -> list[float]:
-    own = SMALL * SIZE**2
-    return [own, 0.0, 0.0, own, 0.0, own]
+    for name, x in zip(SIX, without_rounding(body.inertia)[np.triu_indices(3)], strict=True):
+        _text(inertia, name, repr(float(x)))
 
 
 def _joint(model: ElementTree.Element, link: PlacedLink) -> None:

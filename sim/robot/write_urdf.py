@@ -6,9 +6,9 @@ from xml.etree import ElementTree
 from idbench.identify.basis.block import named
 from idbench.identify.data.kinematics import KinematicTree
 from idbench.sim.robot.mounting import Mounting
-from idbench.sim.robot.placed import BASE, Body, PlacedLink, numbers, placed_links
+from idbench.sim.robot.placed import BASE, Body, PlacedLink, numbers, placed_links, without_rounding
 from idbench.sim.robot.robot import Robot
-from idbench.sim.robot.urdf import GEAR_RATIO, ROTOR_INERTIA, parsed
+from idbench.sim.robot.urdf import GEAR_RATIO, ROTOR_INERTIA, give_inertial, link_of, parsed
 
 UNLIMITED = 1e6  # What stands for no limit, where a URDF must have one
 DRAKE = "http://drake.mit.edu"  # Namespace of the elements that Drake reads
@@ -41,9 +41,9 @@ def _rewrite(root: ElementTree.Element, tree: KinematicTree, standard: Mapping[s
     welded: dict[str, list[str]] = {}
     for joint in joints.values():
         if joint.get("type") == "fixed":
-            welded.setdefault(_end(joint, "parent"), []).append(_end(joint, "child"))
+            welded.setdefault(link_of(joint, "parent"), []).append(link_of(joint, "child"))
     for j, of in enumerate(tree.joints):
-        link = _end(joints[of.name], "child")
+        link = link_of(joints[of.name], "child")
         waiting = list(welded.get(link, ()))
         while waiting:
             other = waiting.pop()
@@ -104,11 +104,6 @@ def _drive(root: ElementTree.Element, joint: str, rotor: float) -> None:
         (ElementTree.SubElement(actuator, tag) if found is None else found).set("value", repr(float(value)))
 
 
-def _end(joint: ElementTree.Element, tag: str) -> str:
-    found = joint.find(tag)
-    return "" if found is None else found.get("link", "")
-
-
 def _bare(link: ElementTree.Element) -> None:
     for inertial in link.findall("inertial"):
         link.remove(inertial)
@@ -116,13 +111,8 @@ def _bare(link: ElementTree.Element) -> None:
 
 def _give(link: ElementTree.Element, body: Body | None) -> None:
     """Give a link its mass, centre of mass and inertia."""
-    if body is None:
-        return
-    inertial = ElementTree.SubElement(link, "inertial")
-    ElementTree.SubElement(inertial, "origin", {"xyz": numbers(body.centre), "rpy": "0 0 0"})
-    ElementTree.SubElement(inertial, "mass", {"value": repr(body.mass)})
-    names = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
-    ElementTree.SubElement(inertial, "inertia", {name: repr(x) for name, x in zip(names, body.six, strict=True)})
+    if body is not None:
+        give_inertial(link, body.mass, {"xyz": numbers(body.centre)}, without_rounding(body.inertia))
 
 
 def _resist(joint: ElementTree.Element, drive: Mapping[str, float]) -> None:
