@@ -75,16 +75,16 @@ def _reporting(init: Callable[..., None], cls: type) -> Callable[..., None]:
     return checked
 
 
-def read_toml(path: Path, what: str, raising: type[Exception] = ScenarioError) -> dict[str, Any]:
-    """Return the document of a file; an error says that `what` cannot be read."""
+def read_toml(path: Path, what: str, kind: type[Exception] = ScenarioError) -> dict[str, Any]:
+    """Return the document of a file of settings; raise an error of a kind that says why `what` cannot be read."""
     try:
         return tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
-        raise raising(f"cannot read {what} {path}: {error.strerror}") from error
+        raise kind(f"cannot read {what} {path}: {error.strerror}") from error
     except RecursionError as error:
-        raise raising(f"cannot read {path}: its tables are nested too deeply") from error
+        raise kind(f"cannot read {path}: its tables are nested too deeply") from error
     except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise raising(f"cannot read {what} {path}: {error}") from error
+        raise kind(f"cannot read {what} {path}: {error}") from error
 
 
 def make(cls: type, content: object, where: str) -> Any:
