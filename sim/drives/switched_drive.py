@@ -10,7 +10,7 @@ from pydantic import Field
 from idbench.sim.drives.averaged_drive import limits
 from idbench.sim.drives.drive import AbstractAmplifier, AbstractDrive, BetweenEdges, Electric, Trace, every
 from idbench.sim.drives.loops import Loops, PeriodTable, Windings
-from idbench.sim.drives.pwm import Modulation, Modulator, Pieces, pieces
+from idbench.sim.drives.pwm import Modulation, Modulator, pieces
 from idbench.sim.drives.winding import Winding, pass_period, straight, stretches
 from idbench.sim.errors import ScenarioError
 from idbench.sim.robot.motors import Array, Motors
@@ -67,59 +67,32 @@ class TabulatedPassages:
         """Advance windings by PWM periods, as `ExactPassages` does."""
         from idbench.sim.drives.periods import periods  # loads a compiler
 
-        return np.asarray(periods(self._compact, loops, windings, wanted, np.ascontiguousarray(emf)))
+        return np.asarray(periods(self._table, loops, windings, wanted, np.ascontiguousarray(emf)))
 
     @cached_property
-    def highest(self) -> int:
-        """Number of the value of the modulation index 1, where that of 0 is 0."""
-        return int(np.ceil(1 / self.least))
-
-    @property
-    def _values(self) -> int:
-        return 2 * self.highest + 1
-
-    @cached_property
-    def _compact(self) -> PeriodTable:
-        """The table, as compiled code takes it."""
+    def _table(self) -> PeriodTable:
+        """What compiled code takes: number of the index 1, where that of 0 is 0, linear functions, and pieces of periods."""
         V, R, L = (np.ascontiguousarray(x[0]) for x in self.winding)
-        shape = *self._pieces.duration.shape, len(V)
-        kept = np.exp(-self._pieces.duration[..., None] * (R / L))
-        each = [np.broadcast_to(x[..., None], shape) for x in self._pieces]
+        highest = int(np.ceil(1 / self.least))
+        indices = np.arange(-highest, highest + 1, dtype=np.float64) * self.least
+        cut = pieces(self.modulator, indices)
+        kept = np.exp(-cut.duration[..., None] * (R / L))
+        each = [np.broadcast_to(x[..., None], kept.shape) for x in cut]
         of_pieces = np.ascontiguousarray(np.stack([*each, kept], axis=-1).swapaxes(0, 1))
-        linear = self._table.reshape(2, self._values, len(V), 3, -1)
-        return PeriodTable(self.least, self.highest, linear, of_pieces, V, R, L, bool(self.modulator.dead_time))
+        return PeriodTable(self.least, highest, self._linear(indices), of_pieces, V, R, L, bool(self.modulator.dead_time))
 
-    @cached_property
-    def _indices(self) -> Array:
-        """Every value of the modulation index."""
-        return np.arange(-self.highest, self.highest + 1, dtype=np.float64) * self.least
-
-    @cached_property
-    def _pieces(self) -> Pieces:
-        return pieces(self.modulator, self._indices)
-
-    @cached_property
-    def _table(self) -> Array:
+    def _linear(self, indices: Array) -> Array:
         """Charge and the currents at edges, (sign, value, joint) -> (constant, by i, by e) x quantity."""
-        V: Array = self.winding.V[0]
-        shape = 2, self._values, len(V)
+        shape = 2, len(indices), self.winding.V.shape[-1]
         winding = Winding(*(np.broadcast_to(x[0], shape) for x in self.winding))
-        m = np.broadcast_to(self._indices[:, None], shape)
+        m = np.broadcast_to(indices[:, None], shape)
         pattern = self.modulator.pattern(m, np.broadcast_to(np.array([0.0, 1.0])[:, None, None], shape))
         made = []
         for i, e in ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0)):
             passage, edges = straight(np.full(shape, i), np.full(shape, e), winding, pattern, self.modulator.period)
             made.append(np.stack([passage.charge, *edges], axis=-1))
-        constant, by_i, by_e = (np.asarray(each, dtype=np.float64) for each in made)
-        table: Array = np.array([constant, by_i - constant, by_e - constant])
-        return np.moveaxis(table, 0, -2).reshape(-1, 3, constant.shape[-1])
-
-
-def passages(winding: Winding, modulator: Modulator, least: float) -> ExactPassages | TabulatedPassages:
-    """Return the passages of windings; `least` is the step of the modulation index, 0 if it has none."""
-    if least and 2 / least < MAX_VALUES:
-        return TabulatedPassages(winding, modulator, least)
-    return ExactPassages(winding, modulator, least)
+        constant, by_i, by_e = made
+        return np.stack([constant, by_i - constant, by_e - constant], axis=-2)
 
 
 @settings
@@ -193,7 +166,8 @@ class SwitchedAmplifier(AbstractAmplifier):
         lost = -np.expm1(-h * R / L)
         kp = R / lost * -np.expm1(-2 * np.pi * settings.bandwidth * h)
         least = settings.duty_resolution * (1 if settings.modulation == "sign_magnitude" else 2)
-        self._passages = passages(self._winding, Modulator(settings.modulation, h, settings.dead_time), least)
+        kind = TabulatedPassages if least and 2 / least < MAX_VALUES else ExactPassages
+        self._passages = kind(self._winding, Modulator(settings.modulation, h, settings.dead_time), least)
         most = 1 - 4 * settings.dead_time / h
         self._most = (np.floor(most / least) * least if least else most) * V
         self._loops = Loops(kp, kp * lost, self._most, settings.emf_compensation)
