@@ -39,10 +39,9 @@ class Task:
     def inertia(self) -> Array:
         """Inertia that each joint's motor sees when the motion starts [kg m^2], shape (1 or nsim, joint)."""
         at = np.atleast_2d(self.reference.q[0])
-        model = self.model if self.vary else InverseDynamics(self.nominal, len(at))
-        still = np.zeros((self.nsim, self.nominal.n)) if self.vary else np.zeros_like(at)
-        model(at + still, still, still)
-        return model.inertia().copy()
+        if self.vary:
+            return self.model.inertia(at + np.zeros((self.nsim, 1)))
+        return InverseDynamics(self.nominal, len(at)).inertia(at)
 
     @property
     def feedforward(self) -> Array:
@@ -86,6 +85,17 @@ class AbstractController(ABC):
         return None
 
 
+class AbstractClosedLoop(AbstractController):
+    """A control law that closes a position loop around every joint."""
+
+    bandwidth: tuple[float, ...]
+
+    @property
+    def wdyn(self) -> float | None:
+        """Natural frequency of the fastest joint [rad/s]."""
+        return max(self.bandwidth)
+
+
 class Error:
     """Control error e = q_ref - q and its low-passed difference quotient.
 
@@ -115,7 +125,7 @@ class Error:
 
 
 @settings
-class PDFeedforward(AbstractController):
+class PDFeedforward(AbstractClosedLoop):
     """PD with feedforward: u = feedforward tau_nominal(q_ref) + M (w^2 e + 2 zeta w de/dt)."""
 
     bandwidth: EachPositive = (15.0,)
@@ -126,11 +136,6 @@ class PDFeedforward(AbstractController):
     """Share of the nominal robot's torque that is fed forward; 1.1 is a model whose inertias are 10 % too large."""
     cutoff: Positive = 100.0
     """First-order low-pass on de/dt [Hz]."""
-
-    @property
-    def wdyn(self) -> float | None:
-        """Natural frequency of the fastest joint [rad/s]."""
-        return max(self.bandwidth)
 
     def start(self, task: Task) -> AbstractLaw:
         """Return the law, its gains for the inertia at the start of the motion."""
@@ -150,18 +155,13 @@ class _PDLaw(AbstractLaw):
 
 
 @settings
-class PID(AbstractController):
+class PID(AbstractClosedLoop):
     """PID: u = M (3 w^2 e + 3 w de/dt + w^3 int e), all poles at -w for a constant inertia."""
 
     bandwidth: EachPositive = (15.0,)
     """Triple pole w of the loop [rad/s], of all joints or of each."""
     cutoff: Positive = 100.0
     """First-order low-pass on de/dt [Hz]."""
-
-    @property
-    def wdyn(self) -> float | None:
-        """Natural frequency of the fastest joint [rad/s]."""
-        return max(self.bandwidth)
 
     def start(self, task: Task) -> AbstractLaw:
         """Return the law, its gains for the inertia at the start of the motion."""
@@ -186,7 +186,7 @@ class _PIDLaw(AbstractLaw):
 
 
 @settings
-class ComputedTorque(AbstractController):
+class ComputedTorque(AbstractClosedLoop):
     """Computed torque: u = (1 + model_error) tau_nominal(q, qd, qdd_ref + w^2 e + 2 zeta w de/dt)."""
 
     bandwidth: EachPositive = (15.0,)
@@ -197,11 +197,6 @@ class ComputedTorque(AbstractController):
     """Share by which all inertias and viscous frictions of the nominal model are wrong."""
     cutoff: Positive = 100.0
     """First-order low-pass on de/dt [Hz]."""
-
-    @property
-    def wdyn(self) -> float | None:
-        """Natural frequency of the fastest joint [rad/s]."""
-        return max(self.bandwidth)
 
     def start(self, task: Task) -> AbstractLaw:
         """Return the law."""

@@ -238,10 +238,5 @@ def mean_torques(log: MotionLog, h: float, per_sample: int) -> Array:
 
 def _inertia(robot: Robot, q: Array) -> Array:
     """Return the diagonal of M at every sample, shape (time, joint)."""
-    found = np.empty(q.shape)
-    for i in range(0, len(q), BLOCK):
-        part = q[i : i + BLOCK]
-        states = InverseDynamics(robot, len(part))
-        states(part, np.zeros_like(part), np.zeros_like(part))
-        found[i : i + BLOCK] = states.inertia()
-    return found
+    parts = (q[i : i + BLOCK] for i in range(0, len(q), BLOCK))
+    return np.concatenate([InverseDynamics(robot, len(part)).inertia(part) for part in parts])

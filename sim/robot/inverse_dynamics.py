@@ -53,9 +53,11 @@ class InverseDynamics:
         """M at the states of the last call [kg m^2], shape (state, joint, joint)."""
         return self._M
 
-    def inertia(self) -> Array:
-        """Return the diagonal of M at the states of the last call [kg m^2], shape (state, joint)."""
-        return np.diagonal(self._M, axis1=1, axis2=2)
+    def inertia(self, q: Array) -> Array:
+        """Diagonal of M at the positions `q` [rad], shape (state, joint) [kg m^2]."""
+        still = np.zeros_like(q)
+        self(q, still, still)
+        return np.diagonal(self._M, axis1=1, axis2=2).copy()
 
 
 def inverse_dynamics(robot: Robot, q: Array, qd: Array, qdd: Array) -> Array:
