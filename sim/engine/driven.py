@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from idbench.identify.data.motion_log import MotionLog
 from idbench.identify.errors import InvariantError
+from idbench.sim.drives import IdealDrive
 from idbench.sim.engine.failures import Bounds
 from idbench.sim.engine.plant import Plant
 from idbench.sim.errors import RobotError, ScenarioError
@@ -186,7 +187,7 @@ def physics_of(robot: Robot, log: MotionLog) -> Physics:
     """
     Fv = robot.model.dof_damping if robot.model.dof_damping.ndim == 1 else robot.model.dof_damping[:, 0]
     stopping = float(np.min(np.divide(_inertia(robot, log.q[:1])[0], Fv, out=np.full(robot.n, np.inf), where=Fv > 0)))
-    h, _ = physics_steps(log.fs, float(np.clip(stopping, SHORTEST, STEP)))
+    h = IdealDrive().step_length(log.fs, float(np.clip(stopping, SHORTEST, STEP)))
     return Physics(h) if stopping > h * (1 - 1e-9) else Physics(h, "implicitfast")
 
 
@@ -204,12 +205,6 @@ def _driven(
         if k + 1 < count:
             plant.step(acting, len(torques))
     return found, list(plant.troubles)
-
-
-def physics_steps(fs: float, longest: float) -> tuple[float, int]:
-    """Return the length of physics steps of at most `longest` [s], and how many a sample takes."""
-    per_sample = int(np.ceil(1 / fs / longest - 1e-9))
-    return 1 / fs / per_sample, per_sample
 
 
 def mean_torques(log: MotionLog, h: float, per_sample: int) -> Array:
