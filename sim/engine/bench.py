@@ -67,7 +67,8 @@ class Bench:
         task = Task(scenario.nominal_robot, planned, nsim, vary if informed else {})
         self._law = _started(scenario.controller, scenario.controller.start(task), AbstractLaw)
         self._drive = _started(scenario.drive, scenario.drive.start(robot, nsim, self._h), AbstractAmplifier)
-        self._ripple, self._smooth = scenario.ripple.start(robot), scenario.ripple.steady
+        self._cogging, self._commutation = scenario.ripple.start(robot)
+        self._smooth = scenario.ripple.steady
         friction, encoder = scenario.friction, scenario.encoder
         self._friction = _started(friction, friction.start(self._plant.joints, self._plant.Fs, self._h), AbstractContact)
         self._encoder = _started(encoder, encoder.start(n, samples, fs, generators(seeds, 0)), AbstractReader)
@@ -84,7 +85,7 @@ class Bench:
         self._qd = np.zeros((nsim, n))
         self._steps = 1
         self._instants = dict[int, tuple[Array, Array]]()
-        self._steady = scenario.drive.steady and scenario.ripple.steady
+        self._steady = scenario.drive.steady and self._smooth
         self._most = self._longest()
         self._measured, self._commands, self._currents, self._q, self._speeds, self._tau = np.zeros((6, samples, nsim, n))
         self._gaps = np.zeros((samples, nsim, n)) if self._plant.has_play else np.zeros(0)
@@ -139,13 +140,13 @@ class Bench:
         rate = (rotor_qd - self._qd) / (self._steps * self._h)  # accelerating as in the steps before
         mid_qd, mid_q = rotor_qd + rate * t, rotor_q + rotor_qd * t + rate * half_square
         self._qd, self._steps = rotor_qd.copy(), steps
-        constant = None if self._smooth else 1 + self._ripple.commutation.at(mid_q)
+        constant = None if self._smooth else 1 + self._commutation.at(mid_q)
         apart = self._plant.has_play and not before_gear
         self._drive.sees(mid_q + (q - rotor_q) + (qd - rotor_qd) * t if apart else mid_q)
         electric = self._drive.step(self._demand, mid_qd if constant is None else mid_qd * constant, steps)
         expect(self._drive, "step", electric, (1, *self._each), (steps, *self._each))
         self._sensor.take(electric, steps * self._h)
-        tau = electric if constant is None else electric * constant + self._ripple.cogging.at(mid_q)
+        tau = electric if constant is None else electric * constant + self._cogging.at(mid_q)
         self._friction.driven(tau[0])
         resistance = self._friction.torque(mid_qd[0])
         expect(self._friction, "torque", np.asarray(resistance), (), self._each)

@@ -1,7 +1,7 @@
 """Robots with other parameters: fields of MuJoCo's model, without compiling it anew."""
 
 from collections.abc import Mapping, Sequence
-from typing import overload
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -94,13 +94,7 @@ class VariedRobots(Sequence[Robot]):
     def __len__(self) -> int:
         return len(self._places)
 
-    @overload
-    def __getitem__(self, place: int) -> Robot: ...
-
-    @overload
-    def __getitem__(self, place: slice) -> Sequence[Robot]: ...
-
-    def __getitem__(self, place: int | slice) -> Robot | Sequence[Robot]:
+    def __getitem__(self, place: Any) -> Any:  # a robot, or the robots of a slice: the overloads are those of a sequence
         if isinstance(place, slice):
             return [self[i] for i in self._places[place]]
         i = self._places[place]

@@ -123,8 +123,8 @@ class Ripple:
         """Whether there is none."""
         return not (self.cogging or any(self.commutation))
 
-    def start(self, robot: Robot) -> "RotorRipple":
-        """Return the ripple of the robot's motors, which are only asked for if there is any.
+    def start(self, robot: Robot) -> "tuple[RippleSeries, RippleSeries]":
+        """Return cogging torque [N m], and torque constant over its mean, minus 1; motors are only asked for if there is any.
 
         Raises
         ------
@@ -136,14 +136,15 @@ class Ripple:
         slots = (motors.order, motors.phase) if motors else (still, still)
         bars = per_joint(self.commutator_bars, n, "ripple.commutator_bars")
         share = per_joint(self.commutation, n, "ripple.commutation")
-        return RotorRipple(
-            _Series(self.cogging * (motors.cogging if motors else still), *slots, self.cogging_harmonics),
-            _Series(share, bars, still, self.commutation_harmonics),
+        cogging = self.cogging * (motors.cogging if motors else still)
+        return (
+            RippleSeries(cogging, *slots, self.cogging_harmonics),
+            RippleSeries(share, bars, still, self.commutation_harmonics),
         )
 
 
 @dataclass(frozen=True, eq=False)
-class _Series:
+class RippleSeries:
     """Sum over k of amplitude * harmonics[k - 1] * sin(k (order q + phase))."""
 
     amplitude: Array
@@ -157,6 +158,7 @@ class _Series:
         return not self.amplitude.any()
 
     def at(self, q: Array) -> Array | float:
+        """Value at the positions q [rad] of rotors."""
         if self.still:
             return 0.0
         angle = self.order * q + self.phase
@@ -165,13 +167,3 @@ class _Series:
         for k, share in enumerate(higher, 2):
             total += share * np.sin(k * angle)
         return self.amplitude * total
-
-
-@dataclass(frozen=True, eq=False)
-class RotorRipple:
-    """The ripple of the motors of a robot."""
-
-    cogging: _Series
-    """Torque that needs no current [N m]."""
-    commutation: _Series
-    """Torque constant over its mean, minus 1."""
