@@ -100,16 +100,12 @@ class ServoDrive(AbstractDrive):
 
     def conditions(self, t: Array, command: Array) -> dict[str, Array]:
         """Return commands, and whether torque is on, if it ever is not."""
-        return {"command": command} | ({"on": self.enabled(t)[:, None]} if self.off else {})
+        return {"command": command} | ({"on": 1.0 - self.is_off(t)[:, None]} if self.off else {})
 
     @property
     def before_gear(self) -> bool:
         """Whether the encoder is at the rotor."""
         return self.sensed == "rotor"
-
-    def enabled(self, t: Array) -> Array:
-        """Return 1 where torque is on and 0 where it is off, at the instants t [s]."""
-        return np.where(self.is_off(t), np.zeros_like(t), 1.0)
 
     def is_off(self, t: Any) -> Any:
         """True if torque is off at an instant, or at instants [s]."""

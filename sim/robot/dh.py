@@ -120,10 +120,6 @@ class _Values:
         scale = 1.0 if self.slides else self._scale
         return [scale * low, scale * high]
 
-    @property
-    def armature(self) -> float:
-        return self.length("armature")
-
     def khalil(self) -> tuple[Array, Array]:
         """Pose of the joint's frame in that of its antecedent."""
         first = _turn("z", self.angle("gamma")) @ _turn("x", self.angle("alpha"))
@@ -154,7 +150,7 @@ def _body(parent: mujoco.MjsBody, name: str, place: tuple[Array, Array], values:
     body.inertia = [SMALL * SIZE**2] * 3
     body.explicitinertial = True
     kind = mujoco.mjtJoint.mjJNT_SLIDE if values.slides else mujoco.mjtJoint.mjJNT_HINGE
-    joint = body.add_joint(name=name, type=kind, axis=[0, 0, 1], armature=values.armature)
+    joint = body.add_joint(name=name, type=kind, axis=[0, 0, 1], armature=values.length("armature"))
     if values.range is not None:
         joint.range, joint.limited = values.range, mujoco.mjtLimited.mjLIMITED_TRUE
     return body

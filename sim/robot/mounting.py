@@ -1,7 +1,7 @@
 """How a robot is mounted and which of its joints a log has: a file describes more than a log shows."""
 
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import mujoco
@@ -179,26 +179,21 @@ def forget(spec: mujoco.MjSpec, held: set[str], names: Sequence[str]) -> None:
 
 
 def _wraps(tendon: mujoco.MjsTendon, held: set[str]) -> bool:
-    return any(getattr(wrap.target, "name", "") in held for wrap in _wraps_of(tendon))
-
-
-def _wraps_of(tendon: mujoco.MjsTendon) -> Iterator[mujoco.MjsWrap]:
     path = tendon.path
-    return (path[i] for i in range(len(path)))
+    return any(getattr(path[i].target, "name", "") in held for i in range(len(path)))
 
 
 def locked(texts: Sequence[str]) -> tuple[tuple[str, float], ...]:
     """Return joints and values of texts such as finger=0.02; raise RobotError if one is none."""
     found = []
     for text in texts:
-        name, mark, value = text.partition("=")
+        name, _, value = text.partition("=")
         try:
             found.append((name, float(value)))
             if not np.isfinite(found[-1][1]):
                 raise ValueError
         except ValueError:
             raise RobotError(f"--lock {text}: give a joint and where it is held [rad, m], such as finger=0.02") from None
-        del mark
     return tuple(found)
 
 

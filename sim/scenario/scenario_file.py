@@ -128,12 +128,8 @@ def _plugin(key: str, table: PluginTable[Any], content: Mapping[str, Any]) -> An
     return make(table[kind], rest, key)  # type: ignore[arg-type]  # the factories of these tables are classes
 
 
-def to_dict(scenario: Scenario) -> dict[str, Any]:
-    """Return the scenario as the keys of a TOML or JSON document, without the settings that are left open."""
-    return _keys(scenario)
-
-
-def _keys(part: Any) -> dict[str, Any]:
+def to_dict(part: Any) -> dict[str, Any]:
+    """Return a scenario, or a part of it, as the keys of a TOML or JSON document, without the settings that are left open."""
     return {key: _value(key, value) for key, value in _settings(part) if value is not None}
 
 
@@ -143,7 +139,7 @@ def _settings(part: Any) -> Iterator[tuple[str, Any]]:
 
 def _value(key: str, value: Any) -> Any:
     if is_dataclass(value):
-        return {**({"kind": _kind(key, value)} if key in KINDS else {}), **_keys(value)}
+        return {**({"kind": _kind(key, value)} if key in KINDS else {}), **to_dict(value)}
     if isinstance(value, tuple):
         return [_value(key, item) for item in value]
     return value

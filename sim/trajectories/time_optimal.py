@@ -88,7 +88,6 @@ class TimeOptimal(AbstractTrajectory):
     def plan(self, robot: Robot) -> JerkLimited:
         """Return ruckig's moves."""
         n, points = len(self.waypoints[0]), np.array(self.waypoints)
-        del robot
         names = ("velocity", "acceleration", "jerk")
         limits = np.array([per_joint(getattr(self, name), n, f"trajectory.{name}") for name in names])
         return JerkLimited.between(points, limits, self.rest)
