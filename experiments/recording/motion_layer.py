@@ -25,7 +25,7 @@ from typing import Literal
 
 from idbench.experiments.recording.columns import part, poses
 from idbench.experiments.text import MEASURED, PLANNED, Color
-from idbench.sim.robot.scene import Mover, SceneShape, motion, shapes
+from idbench.sim.robot.scene import Mover, SceneShape, shapes
 
 ROLES: dict[str, Color | None] = {"true": None, "measured": MEASURED, "planned": PLANNED}
 """Arms that may be shown, and the colour of those that are drawn as wires around the first."""
@@ -48,7 +48,7 @@ class Arm:
         self._stream = stream
         self._robot = robot
         self._mover = Mover(robot)
-        two = motion(robot, np.stack([np.zeros(robot.n), np.full(robot.n, 0.1)]))
+        two = self._mover.at(np.stack([np.zeros(robot.n), np.full(robot.n, 0.1)]))
         pose = {body: np.concatenate([x, two.quaternions[body]], axis=1) for body, x in two.positions.items()}
         self._moving = {body for body, (at, moved) in pose.items() if not np.array_equal(at, moved)}
         stream.keep("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP)
@@ -72,7 +72,7 @@ class Arm:
 
     def trace(self, q: Array) -> None:
         """Draw the way of every site along `q` [rad], shape (time, joint)."""
-        for site, position in motion(self._robot, q).sites.items():
+        for site, position in Mover(self._robot).at(q).sites.items():
             self._stream.keep(
                 f"world/path_of_{part(site)}", rr.LineStrips3D([position], radii=[0.0015], colors=[[190, 190, 190]])
             )

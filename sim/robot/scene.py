@@ -1,7 +1,7 @@
 """What a robot looks like: shapes on moving bodies, for any viewer."""
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 import mujoco
 import numpy as np
@@ -14,14 +14,7 @@ from idbench.sim.robot.robot import Robot
 
 Kind = Literal["sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh"]
 
-_KINDS: dict[int, Kind] = {
-    int(mujoco.mjtGeom.mjGEOM_SPHERE): "sphere",
-    int(mujoco.mjtGeom.mjGEOM_CAPSULE): "capsule",
-    int(mujoco.mjtGeom.mjGEOM_ELLIPSOID): "ellipsoid",
-    int(mujoco.mjtGeom.mjGEOM_CYLINDER): "cylinder",
-    int(mujoco.mjtGeom.mjGEOM_BOX): "box",
-    int(mujoco.mjtGeom.mjGEOM_MESH): "mesh",
-}
+_KINDS: dict[int, Kind] = {int(getattr(mujoco.mjtGeom, f"mjGEOM_{kind.upper()}")): kind for kind in get_args(Kind)}
 
 HIDDEN = 3  # Geoms of this group and higher are not drawn, as in MuJoCo's own viewer: they are there for collisions
 
@@ -92,11 +85,6 @@ def _mesh(model: mujoco.MjModel, m: int) -> tuple[Array, npt.NDArray[np.int32]]:
     first, face = int(model.mesh_vertadr[m]), int(model.mesh_faceadr[m])
     vertices = model.mesh_vert[first : first + int(model.mesh_vertnum[m])].astype(np.float64)
     return vertices, model.mesh_face[face : face + int(model.mesh_facenum[m])].copy()
-
-
-def motion(robot: Robot, q: Array) -> Motion:
-    """Poses of the bodies and sites at the positions `q` [rad], shape (time, joint)."""
-    return Mover(robot).at(q)
 
 
 class Mover:

@@ -4,12 +4,12 @@ import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from idbench.sim.robot.scene import motion, shapes
+from idbench.sim.robot.scene import Mover, shapes
 
 
 def test_shapes_moved_by_their_bodies_are_where_mujoco_puts_the_geoms(robot, rng):
     q = rng.uniform(-2, 2, (5, 2))
-    moving, data = motion(robot, q), mujoco.MjData(robot.model)
+    moving, data = Mover(robot).at(q), mujoco.MjData(robot.model)
     assert {shape.kind for shape in shapes(robot)} == {"box", "cylinder"}
     for k in range(5):
         data.qpos[:] = q[k]

@@ -11,7 +11,7 @@ from idbench.experiments.recording.chart import SQUARE
 from idbench.experiments.recording.columns import POSES, shown
 from idbench.experiments.recording.identification_recording import RunRecording
 from idbench.identify import measured_state
-from idbench.sim.robot.scene import motion, shapes
+from idbench.sim.robot.scene import Mover, shapes
 from idbench.sim.scenario.scenario_file import from_dict
 
 TICK = 10_000_000
@@ -60,7 +60,7 @@ def test_the_true_acceleration_is_the_mean_between_samples(recorded):
 def test_the_arms_move_as_mujoco_moves_them(recorded, role):
     run = recorded.ran.run
     q = {"true": run.q[0], "planned": run.reference.q, "measured": run.log.q[0]}[role]
-    moving, kept = motion(run.robots[0], q), shown(0, len(q), run.log.fs, POSES)
+    moving, kept = Mover(run.robots[0]).at(q), shown(0, len(q), run.log.fs, POSES)
     for body in ("link1", "link2"):
         _, position = recorded.column(f"world/{role}/{body}", "Transform3D:translation")
         _, quaternion = recorded.column(f"world/{role}/{body}", "Transform3D:quaternion")
