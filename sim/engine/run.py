@@ -54,7 +54,7 @@ class Run:
         0.5
         """
         robot, friction = self.robots[0], self.scenario.friction
-        return standard_parameters(robot) | (friction.truth(robot) if friction else {})
+        return standard_parameters(robot) | friction.truth(robot)
 
     def alone(self, i: int = 0) -> MotionLog:
         """Return the log of simulation `i` by itself."""

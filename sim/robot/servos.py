@@ -12,7 +12,7 @@ import numpy.typing as npt
 from idbench.identify.basis.block import named
 from idbench.sim.errors import RobotError
 from idbench.sim.robot.motors import Array
-from idbench.sim.robot.mounting import PLAIN, Mounting
+from idbench.sim.robot.mounting import FIELDS, PLAIN, Mounting
 from idbench.sim.robot.payload import HARD, Payload
 from idbench.sim.robot.rewrite import compiled, rewritten
 from idbench.sim.robot.robot import Robot
@@ -104,7 +104,7 @@ def with_servos(
         If the file does not compile.
     """
     robot = Robot.load(name, mounting.edit)
-    letters = {named(x, j): y for j, s in servos.items() for x, y in _passive(s).items()}
+    letters = {named(x, j): getattr(servo, field) for j, servo in servos.items() for x, field in FIELDS.items()}
     root = ElementTree.fromstring(rewritten(name, letters, folder, mounting))
     for joint in root.iter("joint"):
         if joint.get("name") in [robot.joints[j] for j in servos]:
@@ -146,10 +146,6 @@ def _set_play(root: ElementTree.Element, plays: Mapping[str, float]) -> None:
 
 def _words(numbers: Iterable[float]) -> str:
     return " ".join(f"{x:g}" for x in numbers)
-
-
-def _passive(servo: ServoValues) -> dict[str, float]:
-    return {"Ia": servo.armature, "Fv": servo.damping, "Fs": servo.frictionloss}
 
 
 def _dcmotor(servo: ServoValues) -> dict[str, str]:
