@@ -22,7 +22,7 @@ from idbench.identify.basis.block import FRICTION, NOT_NEGATIVE, Parameter
 from idbench.identify.data.motion_log import never_logged
 from idbench.identify.judge.validation import MARGIN
 from idbench.identify.rows.rows import manageable
-from idbench.sim.engine.driven import Replay, replays
+from idbench.sim.engine.driven import replays
 from idbench.sim.errors import BenchError
 from idbench.sim.robot.robot import Robot
 
@@ -179,12 +179,12 @@ class HeldOut:
         return None if interval is None else (interval.contained(self.problem, self.fit.estimates[model].X))
 
     @cached_property
-    def replays(self) -> dict[str, Replay | str]:
-        """What the robot with each model's parameters does with the torques of the log, or why that is not known."""
+    def replays(self) -> dict[str, Array | str]:
+        """Positions [rad] of the robot with each model's parameters under the torques of the log, or why they are not known."""
         same = dict[str, str]()
         for model in self.fit.estimates:
             same[model] = next((same[other] for other in same if self._agree(model, other)), model)
-        found, driven = dict[str, Replay | str](), dict[str, tuple[Robot, MotionLog]]()
+        found, driven = dict[str, Array | str](), dict[str, tuple[Robot, MotionLog]]()
         for model in dict.fromkeys(same.values()):
             try:
                 robot, log, qd = self.driven(model)
@@ -249,7 +249,7 @@ class HeldOut:
     def position_error(self, model: str) -> Array | None:
         """Return the rms of logged - simulated position [rad], shape (joint,)."""
         simulated = self.replays[model]
-        return None if isinstance(simulated, str) else np.sqrt(np.mean((self._replayed[0].q - simulated.q) ** 2, axis=0))
+        return None if isinstance(simulated, str) else np.sqrt(np.mean((self._replayed[0].q - simulated) ** 2, axis=0))
 
     def summary(self) -> dict[str, Any]:
         """Its part of summary.json."""

@@ -4,7 +4,7 @@ One loop: plants start somewhere in the log, get its torques as its channel says
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -29,21 +29,11 @@ Feedback = Callable[[int, Plant], Array]
 """Torque beside that of the log at a sample [N m], shape (nsim, joint)."""
 
 
-@dataclass(frozen=True, eq=False)
-class Replay:
-    """What a simulated robot does with the torques of a log."""
+def replays(robots: Sequence[Robot], logs: Sequence[MotionLog], qd: Array, bandwidth: float) -> list[Array | str]:
+    """Positions [rad] of robots under torques, shape (time, joint); of one that runs away, when and how.
 
-    q: Array
-    """Its positions [rad], shape (time, joint)."""
-    feedback: Array
-    """What the loop adds to the torques of the log to hold it to the log's motion [N m], shape (time, joint)."""
-
-
-def replays(robots: Sequence[Robot], logs: Sequence[MotionLog], qd: Array, bandwidth: float) -> list[Replay | str]:
-    """Motions of robots under torques, in batches of those that are alike; of one that runs away, when and how.
-
-    The torques act as their log's channel says; the loop adds M (w^2 e + 2 w de/dt), M the diagonal of the inertia matrix. A
-    robot with the parameters of the one that was logged needs no feedback, beside noise.
+    Those that are alike are one batch. The torques act as their log's channel says; the loop adds M (w^2 e + 2 w de/dt), M the
+    diagonal of the inertia matrix. A robot with the parameters of the one that was logged needs no feedback, beside noise.
 
     Parameters
     ----------
@@ -58,7 +48,7 @@ def replays(robots: Sequence[Robot], logs: Sequence[MotionLog], qd: Array, bandw
     """
     if len({(log.fs, log.samples) for log in logs}) > 1:
         raise InvariantError("logs of one run must have the same instants")
-    groups, found = dict[Physics, list[int]](), dict[int, Replay | str]()
+    groups, found = dict[Physics, list[int]](), dict[int, Array | str]()
     for k, (robot, log) in enumerate(zip(robots, logs, strict=True)):
         groups.setdefault(physics_of(robot, log), []).append(k)
     for group in groups.values():
@@ -70,23 +60,23 @@ def replays(robots: Sequence[Robot], logs: Sequence[MotionLog], qd: Array, bandw
     return [found[k] for k in range(len(robots))]
 
 
-def _replayed(robots: Sequence[Robot], logs: Sequence[MotionLog], qd: Array, bandwidth: float) -> list[Replay | str]:
+def _replayed(robots: Sequence[Robot], logs: Sequence[MotionLog], qd: Array, bandwidth: float) -> list[Array | str]:
     log, nsim = logs[0], len(robots)
     reference = Reference(log.fs, log.q, qd, np.zeros_like(qd))
     kp = np.stack([_inertia(robot, log.q) for robot in robots], axis=1) * bandwidth**2
-    feedback, failed = np.empty(kp.shape), dict[int, str]()
+    failed = dict[int, str]()
     bounds = Bounds(robots[0], reference, nsim)
 
     def held(k: int, plant: Plant) -> Array:
         for sim, why in {**plant.troubles, **bounds.broken(plant.q, plant.qd)}.items():
             failed.setdefault(sim, f"a robot with these parameters does not follow the log: {why} after {k / log.fs:.3g} s")
             plant.put(log.q[k], np.array([sim]))
-        feedback[k] = kp[k] * (log.q[k] - plant.q + 2 / bandwidth * (qd[k] - plant.qd))
-        return feedback[k]
+        found: Array = kp[k] * (log.q[k] - plant.q + 2 / bandwidth * (qd[k] - plant.qd))
+        return found
 
     started = _start(robots, logs, np.tile(log.q[0], (nsim, 1)), np.tile(qd[0], (nsim, 1)))
     q, _ = _driven(started, log.samples * np.arange(nsim), log.samples, held)
-    return [failed.get(sim) or Replay(q[sim], feedback[:, sim]) for sim in range(nsim)]
+    return [failed.get(sim) or q[sim] for sim in range(nsim)]
 
 
 def free_run(robot: Robot, log: MotionLog, qd: Array, length: float) -> tuple[Array, Array]:
