@@ -175,7 +175,7 @@ def physics_of(robot: Robot, log: MotionLog) -> Physics:
     RK4 follows joints that viscous friction stops in M / Fv with as long a step, and becomes unstable where a step is 2.8 times
     as long: what stops in less than the shortest is integrated implicitly (to first order, and half a step early).
     """
-    Fv = robot.model.dof_damping if robot.model.dof_damping.ndim == 1 else robot.model.dof_damping[:, 0]
+    Fv = robot.model.dof_damping
     stopping = float(np.min(np.divide(_inertia(robot, log.q[:1])[0], Fv, out=np.full(robot.n, np.inf), where=Fv > 0)))
     h = IdealDrive().step_length(log.fs, float(np.clip(stopping, SHORTEST, STEP)))
     return Physics(h) if stopping > h * (1 - 1e-9) else Physics(h, "implicitfast")

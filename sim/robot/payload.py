@@ -78,12 +78,7 @@ class Payload:
         link = spec.joints[-1].parent
         body = link.add_body(name="payload", pos=list(self.position))
         body.mass = self.mass
-        body.inertia = [self._inertia] * 3
+        radius = (3 * self.mass / (4 * pi * 7850)) ** (1 / 3)  # of a ball of 7850 kg/m^3, whose inertia is 2/5 m r^2
+        body.inertia = [self.inertia or 0.4 * self.mass * radius**2] * 3
         body.ipos = [0, 0, 0]
         body.explicitinertial = True
-
-    @property
-    def _inertia(self) -> float:
-        """2/5 m r^2 of a ball of 7850 kg/m^3, where no inertia is given."""
-        radius = (3 * self.mass / (4 * pi * 7850)) ** (1 / 3)
-        return self.inertia or 0.4 * self.mass * radius**2

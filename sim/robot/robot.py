@@ -81,7 +81,6 @@ class Robot:
                 notes = (*notes, *hold_bases(spec), *drop_ties(spec))
                 robot = cls(Path(name).stem, spec.compile(), notes)
             robot.require_possible()
-            robot.require_resisting()
             return robot
         except BenchError:
             raise
@@ -122,7 +121,7 @@ class Robot:
             raise RobotError(f"MuJoCo cannot read {name!r}: {' '.join(str(error).split())}") from error
 
     def require_possible(self) -> None:
-        """Raise RobotError if a number of the file is none, or larger than any of a robot."""
+        """Raise RobotError if a number of the file is none, larger than any of a robot, or lets a joint drive itself."""
         model = self.model
         bodies = {"mass": (model.body_mass, 1e6), "inertia": (model.body_inertia, 1e9)}
         drives = {"armature": model.dof_armature, "damping": model.dof_damping, "frictionloss": model.dof_frictionloss}
@@ -139,15 +138,11 @@ class Robot:
                 raise RobotError(f"robot {self.name!r}: joint {self.joints[j]} has {name} = {values[j]:g}: correct the file")
         if not (np.abs(model.opt.gravity) <= 1e3).all():
             raise RobotError(f"robot {self.name!r}: gravity = {model.opt.gravity.tolist()} must be numbers up to 1000 m/s^2")
-
-    def require_resisting(self) -> None:
-        """Raise RobotError if a joint has a negative friction or rotor: it would drive itself."""
-        for field in ("damping", "frictionloss", "armature"):
-            values = getattr(self.model, f"dof_{field}")
-            if (values < 0).any():
-                j = int(np.argmin(values))
+        for name in ("damping", "frictionloss", "armature"):  # with which a joint would drive itself
+            if (drives[name] < 0).any():
+                j = int(np.argmin(drives[name]))
                 raise RobotError(
-                    f"robot {self.name!r}: joint {self.joints[j]} has {field} = {values[j]:g}, which must be 0 or above: "
+                    f"robot {self.name!r}: joint {self.joints[j]} has {name} = {drives[name][j]:g}, which must be 0 or above: "
                     "correct the file"
                 )
 

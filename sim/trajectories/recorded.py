@@ -44,12 +44,8 @@ class RecordedMotion(AbstractMotion):
     @cached_property
     def moving(self) -> Array:
         """Speed at the first and the last instant, as a share of the largest of all joints, shape (2, joint)."""
-        speed = np.abs(self._free.derivative()(self.t))
+        speed = np.abs(scipy.interpolate.make_interp_spline(self.t, self.q, k=DEGREE).derivative()(self.t))
         return speed[[0, -1]] / max(speed.max(), np.finfo(float).tiny)
-
-    @cached_property
-    def _free(self) -> "scipy.interpolate.BSpline":
-        return scipy.interpolate.make_interp_spline(self.t, self.q, k=DEGREE)
 
     @cached_property
     def _curves(self) -> "tuple[scipy.interpolate.BSpline, ...]":
