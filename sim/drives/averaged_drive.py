@@ -5,15 +5,14 @@ from typing import ClassVar
 import numpy as np
 
 from idbench.sim.drives.drive import AbstractAmplifier, AbstractDrive, Electric, Trace, every
+from idbench.sim.drives.pwm import within
 from idbench.sim.errors import ScenarioError
 from idbench.sim.robot.motors import Array, Motors
 from idbench.sim.robot.robot import Robot
 from idbench.sim.settings import EachPositiveOrNone, Positive, per_joint, settings
 
-Limit = EachPositiveOrNone
 
-
-def limits(robot: Robot, voltage: Limit, current: Limit) -> tuple[Array, Array]:
+def limits(robot: Robot, voltage: EachPositiveOrNone, current: EachPositiveOrNone) -> tuple[Array, Array]:
     """Return the bus voltage [V] and largest current [A] of every joint: a setting, or what the motors have, if less."""
     motors = robot.motors
     n = robot.n
@@ -68,7 +67,7 @@ class _Amplifier(AbstractAmplifier):
         dt = steps * self._h
         e = self._K * speed[len(speed) // 2]
         i0 = self._i
-        limited = np.minimum(np.maximum(demand / self._K, -self._I), self._I)
+        limited = within(demand / self._K, self._I)
         target = np.minimum(np.maximum(limited, (-self._V - e) / self._R), (self._V - e) / self._R)
         asked = self._R * i0 + self._L * self._w * (target - i0) + e
         saturated = np.abs(asked) > self._V

@@ -10,7 +10,7 @@ from pydantic import Field
 from idbench.sim.drives.averaged_drive import limits
 from idbench.sim.drives.drive import AbstractAmplifier, AbstractDrive, BetweenEdges, Electric, Trace, every
 from idbench.sim.drives.loops import Loops, PeriodTable, Windings
-from idbench.sim.drives.pwm import Modulation, Modulator, pieces
+from idbench.sim.drives.pwm import Modulation, Modulator, pieces, within
 from idbench.sim.drives.winding import Winding, pass_period, straight, stretches
 from idbench.sim.errors import ScenarioError
 from idbench.sim.robot.motors import Array, Motors
@@ -39,7 +39,7 @@ class ExactPassages:
         for k, e in enumerate(emf):
             error = wanted - windings.i
             asked = loops.kp * error + windings.sum + loops.known * e
-            v = np.minimum(np.maximum(asked, -loops.most), loops.most)
+            v = within(asked, loops.most)
             windings.sum[:] += loops.ki * error * (v == asked)
             m = v / self.winding.V
             index[k], before[k] = np.rint(m / self.least) * self.least if self.least else m, windings.i
@@ -175,7 +175,7 @@ class SwitchedAmplifier(AbstractAmplifier):
 
     def step(self, demand: Array, speed: Array, steps: int) -> Array:
         """Advance by PWM periods; return the mean torque in each."""
-        wanted = np.minimum(np.maximum(demand / self._K, -self._I), self._I)
+        wanted = within(demand / self._K, self._I)
         e = self._K * speed
         charge, before, after, index = self._passages.advance(self._loops, self._windings, wanted, e)
         self.trace = wanted, charge, before, after, e, index
