@@ -3,7 +3,7 @@
 import pytest
 
 from idbench.experiments.contracts.contract import Example
-from idbench.experiments.contracts.contracts import CONTRACTS, kept
+from idbench.experiments.contracts.contracts import CONTRACTS, found, keeps
 from idbench.experiments.plugin_tables import TABLES
 from idbench.identify import BLOCKS, CHAINS, MODELS, Basis, identify, scara
 from idbench.identify.models import THREE
@@ -21,7 +21,7 @@ SIMULATING = {f"estimators/{name}" for name in ("IV", "DIDIM", "CLIE", "CLOE", "
 
 @pytest.mark.parametrize("name", [pytest.param(n, marks=[pytest.mark.thorough] * (n in SIMULATING)) for n in EVERY])
 def test_it_keeps_its_contract(name, example):
-    assert [f"{asked} {complaint}" for asked, complaint in kept(name, example) if complaint] == []
+    assert [f"{asked} {complaint}" for asked, complaint in keeps(*found(name), example) if complaint] == []
 
 
 def test_every_point_has_a_contract():

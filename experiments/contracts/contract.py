@@ -1,6 +1,6 @@
 """What a contract is made of: examples to try a plug-in with, and complaints that say what is wrong."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -12,7 +12,6 @@ from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.identification.simulators import RobotPlant, ScenarioLoop
 from idbench.experiments.paper.table1 import SCENARIO, Table1
 from idbench.identify import Array, MotionLog, Simulation
-from idbench.identify.blame import is_mistake
 from idbench.sim.engine.run import Run
 from idbench.sim.engine.simulation import simulate
 from idbench.sim.robot.robot import Robot
@@ -99,24 +98,9 @@ def require_equal(found: Any, expected: Any, what: str, rtol: float = 0.0, atol:
         raise ContractError(f"{what} is off by up to {off:.3g}")
 
 
-def untouched(function: Callable[..., Array], *arrays: Array) -> Array:
-    """Result of a function for read-only arrays; raise ContractError if it is not the same bits twice."""
-    for array in arrays:
-        array.setflags(write=False)
-    first, second = function(*arrays), function(*arrays)
+def untouched(function: Callable[[Array], Array], array: Array) -> Array:
+    """Result of a function for a read-only array; raise ContractError if it is not the same bits twice."""
+    array.setflags(write=False)
+    first, second = function(array), function(array)
     require_equal(first, second, "the result of a second call")
     return first
-
-
-def checked(plugin: Any, clauses: tuple[Clause, ...], example: Example) -> Iterator[tuple[str, str]]:
-    """Yield what each clause asks, and why the plug-in does not keep it; empty if it does."""
-    for clause in clauses:
-        asked = (clause.__doc__ or "").splitlines()[0]
-        try:
-            clause(plugin, example)
-        except BaseException as error:  # whatever a plug-in raises
-            if not is_mistake(error):
-                raise
-            yield asked, f"{type(error).__name__}: {error}" if not isinstance(error, ContractError) else str(error)
-        else:
-            yield asked, ""

@@ -6,7 +6,7 @@ from typing import Any
 
 from idbench.experiments.contracts import identification_contracts as identification
 from idbench.experiments.contracts import simulation_contracts as simulation
-from idbench.experiments.contracts.contract import Clause, Example, checked
+from idbench.experiments.contracts.contract import Clause, ContractError, Example
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.plugin_tables import TABLES
 from idbench.identify.blame import is_mistake
@@ -80,12 +80,15 @@ def _loaded(name: str) -> tuple[Table[Any], Any]:
     return there[0], made
 
 
-def kept(name: str, example: Example) -> Iterator[tuple[str, str]]:
-    """Yield what the plug-in of a name is asked, and why it does not keep it; empty if it does."""
-    table, plugin = found(name)
-    yield from keeps(table, plugin, example)
-
-
 def keeps(table: Table[Any], plugin: Any, example: Example) -> Iterator[tuple[str, str]]:
     """Yield what a plug-in of a table is asked, and why it does not keep it; empty if it does."""
-    yield from checked(plugin, (identification.is_immutable, *CONTRACTS[table.point]), example)
+    for clause in (identification.is_immutable, *CONTRACTS[table.point]):
+        asked = (clause.__doc__ or "").splitlines()[0]
+        try:
+            clause(plugin, example)
+        except BaseException as error:  # whatever a plug-in raises
+            if not is_mistake(error):
+                raise
+            yield asked, f"{type(error).__name__}: {error}" if not isinstance(error, ContractError) else str(error)
+        else:
+            yield asked, ""
