@@ -84,8 +84,6 @@ class ReadLog:
     """What the file holds."""
     channel: TorqueChannel
     """What its torque means, as it was logged."""
-    repaired: Repaired | None = None
-    """What was done to its clock, if that was asked for."""
     notes: tuple[str, ...] = ()
     """What was done or assumed."""
     simulated: bool = False
@@ -120,12 +118,12 @@ def read(path: Path, options: ReadOptions, robot_model: RobotModel | None) -> Re
     notes += [f"names of the log's joints have {before!r} before those of the robot's"] if before else []
     if poses:
         log, said = poses_of(columns, channel)
-        return ReadLog(path, (log,), columns, channel, None, (*notes, said))
+        return ReadLog(path, (log,), columns, channel, (*notes, said))
     notes += ["no --torque-delay was given, 0 is assumed: `estimate` finds it"] if assumed else []
     if options.columns.resample or columns.t_tau is not None:
         repaired = Repaired.of(columns, channel)
-        words = [*repaired.words(names), *notes]
-        return ReadLog(path, repaired.logs, columns, channel, repaired, tuple(words), options.columns.simulated)
+        words = (*repaired.words(names), *notes)
+        return ReadLog(path, repaired.logs, columns, channel, words, options.columns.simulated)
     try:
         log = MotionLog.at_times(columns.t, columns.q, columns.tau, channel, columns.conditions, columns.missing)
     except TimeError as error:
@@ -134,7 +132,7 @@ def read(path: Path, options: ReadOptions, robot_model: RobotModel | None) -> Re
             f"{path}: {error}: add --resample, or write it anew and look: {program()} resample {shlex.quote(str(path))} "
             f"--torque {channel.meaning}{late} --out uniform.parquet"
         ) from error
-    return ReadLog(path, (log,), columns, channel, None, tuple(notes), options.columns.simulated)
+    return ReadLog(path, (log,), columns, channel, tuple(notes), options.columns.simulated)
 
 
 def _ordered(path: Path, columns: LogColumns, robot_model: RobotModel | None) -> tuple[LogColumns, str]:
