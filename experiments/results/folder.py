@@ -3,7 +3,7 @@
 import json
 import os
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
 from fnmatch import fnmatch
 from pathlib import Path
@@ -52,35 +52,30 @@ class ResultsFolder:
 
     def check(self) -> None:
         """Raise ResultsError if the results cannot go there, or files of others would have to go."""
-        try:
-            self._check()
-        except OSError as error:
-            raise self._unwritable(error) from error
-
-    def _check(self) -> None:
-        if str(self.out) == "." and not self.force:
-            raise ResultsError("--out is the folder that you are in, or empty: name a folder of its own for the results")
-        if self.out.exists() and not self.out.is_dir():
-            raise ResultsError(f"{self.out} is a file, not a folder: choose another --out")
-        if not self.out.is_dir():
-            return
-        if read := next((path for path in self.out.iterdir() if self._writes(path.name) and self._reads(path)), None):
-            raise ResultsError(f"{read} is a file that this command reads, and results take its name: choose another --out")
-        if self.force:
-            return
-        if (self.out / "study.toml").is_file() and self.experiment != "study":
-            raise ResultsError(f"{self.out} holds a study: choose another --out")
-        manifest = Manifest.of(self.out)
-        there = sorted({path.name for pattern in FILES[self.experiment] for path in self.out.glob(pattern)})
-        if strange := [name for name in there if not manifest.owns(name)]:
-            raise ResultsError(
-                f"{self.out} holds {_summarized(self.out)}{', '.join(strange)}, not written by idbench or changed since: "
-                "choose another --out, or replace them with --force"
-            )
-        if others := [command for command in manifest.commands if command != self.command]:
-            raise ResultsError(
-                f"{self.out} holds the results of `{others[0]}`: choose another --out, or replace them with --force"
-            )
+        with self._writing():
+            if str(self.out) == "." and not self.force:
+                raise ResultsError("--out is the folder that you are in, or empty: name a folder of its own for the results")
+            if self.out.exists() and not self.out.is_dir():
+                raise ResultsError(f"{self.out} is a file, not a folder: choose another --out")
+            if not self.out.is_dir():
+                return
+            if read := next((path for path in self.out.iterdir() if self._writes(path.name) and self._reads(path)), None):
+                raise ResultsError(f"{read} is a file that this command reads, and results take its name: choose another --out")
+            if self.force:
+                return
+            if (self.out / "study.toml").is_file() and self.experiment != "study":
+                raise ResultsError(f"{self.out} holds a study: choose another --out")
+            manifest = Manifest.of(self.out)
+            there = sorted({path.name for pattern in FILES[self.experiment] for path in self.out.glob(pattern)})
+            if strange := [name for name in there if not manifest.owns(name)]:
+                raise ResultsError(
+                    f"{self.out} holds {_summarized(self.out)}{', '.join(strange)}, not written by idbench or changed since: "
+                    "choose another --out, or replace them with --force"
+                )
+            if others := [command for command in manifest.commands if command != self.command]:
+                raise ResultsError(
+                    f"{self.out} holds the results of `{others[0]}`: choose another --out, or replace them with --force"
+                )
 
     @contextmanager
     def held(self) -> Iterator[None]:
@@ -92,7 +87,9 @@ class ResultsFolder:
             As `check` does, or if another process holds it.
         """
         self.check()
-        made = self._made()
+        made = [folder for folder in (self.out, *self.out.parents) if not folder.exists()]  # the innermost first
+        with self._writing():
+            self.out.mkdir(parents=True, exist_ok=True)
         try:
             with self._locked():
                 yield
@@ -107,10 +104,8 @@ class ResultsFolder:
         if fcntl is None:
             yield
             return
-        try:
+        with self._writing():
             held = os.open(self.out, os.O_RDONLY)
-        except OSError as error:
-            raise self._unwritable(error) from error
         try:
             try:
                 fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -124,17 +119,7 @@ class ResultsFolder:
         finally:
             os.close(held)
 
-    def _made(self) -> list[Path]:
-        """Make the folder; return which folders were made, the innermost first."""
-        missing = [folder for folder in (self.out, *self.out.parents) if not folder.exists()]
-        try:
-            self.out.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise self._unwritable(error) from error
-        return missing
-
-    @contextmanager
-    def complete(self) -> Iterator[Path]:
+    def complete(self) -> AbstractContextManager[Path]:
         """Give a hidden folder to write results to; on success they take the place of all earlier ones, summary.json last.
 
         Raises
@@ -142,14 +127,11 @@ class ResultsFolder:
         ResultsError
             If they cannot be written, or files have come meanwhile that idbench did not write.
         """
-        with self._exchanged(complete=True) as hidden:
-            yield hidden
+        return self._exchanged(complete=True)
 
-    @contextmanager
-    def more(self) -> Iterator[Path]:
+    def more(self) -> AbstractContextManager[Path]:
         """Give a hidden folder to write further files to; on success they come beside the results; errors as `complete`."""
-        with self._exchanged(complete=False) as hidden:
-            yield hidden
+        return self._exchanged(complete=False)
 
     def add(self, name: str, content: str | bytes) -> None:
         """Write one further file; errors as `complete`."""
@@ -159,12 +141,9 @@ class ResultsFolder:
 
     @contextmanager
     def _exchanged(self, *, complete: bool) -> Iterator[Path]:
-        try:
-            with hidden_folder(self.out) as hidden:
-                yield hidden
-                self._exchange(hidden, complete=complete)
-        except OSError as error:
-            raise self._unwritable(error) from error
+        with self._writing(), hidden_folder(self.out) as hidden:
+            yield hidden
+            self._exchange(hidden, complete=complete)
 
     def _exchange(self, hidden: Path, *, complete: bool) -> None:
         manifest = Manifest.of(self.out)
@@ -224,8 +203,14 @@ class ResultsFolder:
             f"{target} exists, and idbench did not write it as it is: choose another --out, or replace it with --force"
         )
 
-    def _unwritable(self, error: OSError) -> ResultsError:
-        return ResultsError(f"cannot write to {self.out}: {error.strerror or error}; choose another --out, or free some space")
+    @contextmanager
+    def _writing(self) -> Iterator[None]:
+        """Turn errors of the file system into a ResultsError."""
+        try:
+            yield
+        except OSError as error:
+            why = error.strerror or error
+            raise ResultsError(f"cannot write to {self.out}: {why}; choose another --out, or free some space") from error
 
 
 def _summarized(folder: Path) -> str:
