@@ -9,7 +9,7 @@ from typing import Any, Self
 import numpy as np
 
 from idbench.experiments.errors import ExperimentError
-from idbench.experiments.identification.friction_laws import FrictionLaws, balancers, law_of
+from idbench.experiments.identification.friction_laws import AUTO, SMOOTH, FrictionLaws, balancers, law_of
 from idbench.experiments.identification.known import Known, RoughlyKnown
 from idbench.experiments.requests.shared import Parameters
 from idbench.identify import BLOCKS, AbstractJointLaw, BaseParameters, Basis, KinematicTree, SettingError, tree_basis
@@ -127,10 +127,8 @@ class RobotModel:
 
     def require_laws(self) -> None:
         """Raise ExperimentError if its laws of friction are those that suit a log, where there is none."""
-        if self.laws.smooth:
-            raise ExperimentError("--friction smooth looks at a log, and there is none here: name the laws")
-        if self.laws.auto:
-            raise ExperimentError("--friction auto looks at a log, and there is none here: name the laws")
+        if word := SMOOTH if self.laws.smooth else AUTO if self.laws.auto else "":
+            raise ExperimentError(f"--friction {word} looks at a log, and there is none here: name the laws")
 
     def require_linear(self) -> None:
         """Raise ExperimentError if its laws of friction hold about an estimate alone."""

@@ -6,7 +6,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from io import StringIO
 from typing import Any, Protocol, TextIO
 
@@ -197,10 +197,5 @@ def new_page(*, machine: bool = False) -> Page:
     return Page(machine=machine)
 
 
-@contextmanager
-def shown(page: Page) -> Iterator[None]:
-    """Show what the page holds at the end of the block, however that ends: it is worth keeping."""
-    try:
-        yield
-    finally:
-        page.close()
+shown = closing
+"""Shows what a page holds at the end of the block, however that ends: it is worth keeping."""
