@@ -10,7 +10,6 @@ from idbench.identify.arrays import TINY
 from idbench.identify.parameters.bodies import exist
 from idbench.identify.parameters.consistent import NEAR, least_change
 from idbench.identify.telling import stage
-from idbench.sim.robot.tree import standard_parameters
 
 HELD_NEAR = 1.0
 """What a step to twice the robot costs one that is drawn [squared sigma]: a prior of that width. A millionth lets rotors
@@ -22,12 +21,7 @@ SURE = 0.1  # Sigma of what was left out, as a share of the least of the others
 def consistent_of(robot_model: RobotModel, estimate: Estimate, weight: float = NEAR, near: Array | None = None) -> Consistent:
     """Return the physically consistent standard parameters that agree best with an estimate, near the file's, or others."""
     X, C = _of_all(robot_model, estimate)
-    return consistent_parameters(robot_model.grouping, X, C, _given(robot_model) if near is None else near, weight=weight)
-
-
-def _given(robot_model: RobotModel) -> Array:
-    given = standard_parameters(robot_model.robot)
-    return np.array([given.get(name, 0.0) for name in robot_model.grouping.standard.names])
+    return consistent_parameters(robot_model.grouping, X, C, robot_model.filed if near is None else near, weight=weight)
 
 
 def drawn_about(robot_model: RobotModel, estimate: Estimate, deviations: Array) -> Array:

@@ -13,7 +13,6 @@ from idbench.identify import Array, Consistent
 from idbench.identify.basis.block import FRICTION
 from idbench.sim.robot.rewrite import compiled, rewritten
 from idbench.sim.robot.robot import Robot
-from idbench.sim.robot.tree import standard_parameters
 
 LITTLE = 0.1  # Differences of torques of less than so many per cent are not named
 
@@ -95,5 +94,5 @@ class WrittenRobot:
     @property
     def lost(self) -> dict[str, float]:
         """Standard parameters that have no place in the file, and their values."""
-        known = standard_parameters(self.fit.robot_model.robot)
-        return {name: value for name, value in self.values.items() if name not in known and value}
+        filed = self.fit.robot_model.given
+        return {name: value for name, value in self.values.items() if name not in filed and value}

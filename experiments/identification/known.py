@@ -8,7 +8,7 @@ from typing import Self
 import numpy as np
 
 from idbench.experiments.errors import ExperimentError
-from idbench.identify import BaseParameters, Basis
+from idbench.identify import Array, BaseParameters, Basis
 from idbench.identify.basis.block import BODY, FRICTION, Kind
 from idbench.identify.parameters.prior import FilePrior, normal_prior, prior_sum
 from idbench.identify.plugins import did_you_mean
@@ -134,8 +134,8 @@ class RoughlyKnown:
             values[name] = Trust(value, sigma, relative)
         return cls(links, share, values)
 
-    def prior(self, grouping: BaseParameters, basis: Basis, filed: Mapping[str, float], share: float | None) -> Prior:
-        """Prior of the parameters of a basis.
+    def prior(self, grouping: BaseParameters, basis: Basis, filed: Array, share: float | None) -> Prior:
+        """Prior of the parameters of a basis, `filed` being the standard ones of the robot's file.
 
         Raises
         ------
@@ -144,13 +144,12 @@ class RoughlyKnown:
         """
         K = grouping.K[[grouping.basis.places[parameter] for parameter in basis.parameters]]
         standard = grouping.standard.parameters
-        values = np.array([filed.get(p.name, 0.0) for p in standard])
         parts, known = list[Prior](), np.full(len(standard), inf)
-        stated = values.copy()
+        stated = filed.copy()
         for name, trust in self.values.items():
             if name in basis.names and name not in grouping.standard.names:
                 place = basis.names.index(name)
-                value, sigma = trust.of(float(K[place] @ values))
+                value, sigma = trust.of(float(K[place] @ filed))
                 _require_sigma(name, sigma)
                 parts.append(normal_prior(np.eye(len(basis.names))[:, [place]], np.array([value]), np.array([sigma])))
                 continue
@@ -159,7 +158,7 @@ class RoughlyKnown:
                 hint = did_you_mean(name, [*grouping.standard.names, *basis.names])
                 raise ExperimentError(f"--prior: there is no parameter {name!r}{hint}")
             for i in places:
-                stated[i], known[i] = trust.of(values[i])
+                stated[i], known[i] = trust.of(filed[i])
                 _require_sigma(standard[i].name, known[i])
         if np.isfinite(known).any():
             used = (K[:, np.isfinite(known)] != 0).any(axis=1) & ~(K[:, ~np.isfinite(known)] != 0).any(axis=1)
@@ -176,7 +175,7 @@ class RoughlyKnown:
                     f"--prior file: {', '.join(sorted(given))} is held or tied, but links are near the file's as a whole: "
                     "leave one out"
                 )
-            parts.append(FilePrior(K, standard, values, share or self.share or SHARE))
+            parts.append(FilePrior(K, standard, filed, share or self.share or SHARE))
         return parts[0] if len(parts) == 1 else prior_sum(parts)
 
 

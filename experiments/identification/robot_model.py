@@ -12,15 +12,27 @@ from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.friction_laws import AUTO, SMOOTH, FrictionLaws, balancers, law_of
 from idbench.experiments.identification.known import Known, RoughlyKnown
 from idbench.experiments.requests.shared import Parameters
-from idbench.identify import BLOCKS, AbstractJointLaw, BaseParameters, Basis, KinematicTree, SettingError, tree_basis
+from idbench.identify import (
+    BLOCKS,
+    AbstractJointLaw,
+    Array,
+    BaseParameters,
+    Basis,
+    IdentificationError,
+    KinematicTree,
+    SettingError,
+    tree_basis,
+)
 from idbench.identify.basis.block import named
 from idbench.identify.parameters.base_parameters import in_letters_of_the_paper
 from idbench.identify.rows.factors import Prior
 from idbench.identify.tables import html_table, text_table
+from idbench.sim.errors import BenchError
 from idbench.sim.frictions import AbstractFrictionLaw
 from idbench.sim.robot.mounting import PLAIN, Mounting, with_values
 from idbench.sim.robot.robot import FILES, Robot
 from idbench.sim.robot.tree import kinematic_tree, standard_parameters
+from idbench.sim.robot.varied import model_fields
 
 SCARA = "scara"  # The robot of the paper, which is taken where none is named
 
@@ -81,7 +93,17 @@ class RobotModel:
         """Prior of the parameters, links to a `share` of the file's; None if there is none."""
         if not self.asked.prior:
             return None
-        return self.roughly_known.prior(self.grouping, self.basis, standard_parameters(self.robot), share)
+        return self.roughly_known.prior(self.grouping, self.basis, self.filed, share)
+
+    @cached_property
+    def given(self) -> dict[str, float]:
+        """Standard parameters of the robot's file, by name."""
+        return standard_parameters(self.robot)
+
+    @cached_property
+    def filed(self) -> Array:
+        """Standard parameters as the robot's file has them, shape (standard parameter,); zero of what it does not have."""
+        return np.array([self.given.get(name, 0.0) for name in self.grouping.standard.names])
 
     @cached_property
     def held(self) -> dict[str, float]:
@@ -112,7 +134,7 @@ class RobotModel:
         written = in_letters_of_the_paper(self.tree) if self.name == SCARA else None
         if not self.asked.hold:
             return BaseParameters.of(self.tree, standard, written)
-        grouping = BaseParameters.of(self.tree, self.known.holding(standard, standard_parameters(self.robot)), written)
+        grouping = BaseParameters.of(self.tree, self.known.holding(standard, self.given), written)
         self.known.require(standard, grouping.basis)
         return grouping
 
@@ -153,7 +175,7 @@ class RobotModel:
         """What is identified."""
         whole = self.grouping.basis
         if self.asked.hold:  # base parameters may be held, too
-            whole = Known((), self.known.values).holding(whole, self.grouping.values(standard_parameters(self.robot)))
+            whole = Known((), self.known.values).holding(whole, self.grouping.values(self.given))
         if missing := [name for name in self.asked.without if name not in whole.names]:
             laws = "" if self.laws.standard else f" with --friction {' '.join(self.asked.friction)}"
             raise ExperimentError(
@@ -169,6 +191,40 @@ class RobotModel:
         standard = standard_parameters(robot) | (friction.truth(robot) if friction else {})
         known = self.grouping.values(standard)
         return {name: known.get(name, 0.0) for name in self.basis.names}
+
+    def fields(self, X: Array, *, exact: bool = True) -> dict[str, Array]:
+        """Return MuJoCo's fields of robots with parameters X, shape (nsim, p): those nearest to the file's standard parameters.
+
+        Parameters that these robots do not have are an error if they must be exact, and left out otherwise.
+
+        Raises
+        ------
+        IdentificationError
+            If a parameter is of a law of friction that the simulated robot does not have.
+        """
+        grouping = self.grouping
+        base = np.zeros((len(X), len(grouping.names)))
+        base[:, [grouping.basis.places[parameter] for parameter in self.basis.parameters]] = X
+        unknown = [name for name in grouping.standard.names if name not in self.given]
+        if unknown and exact:
+            raise IdentificationError(
+                f"{', '.join(unknown)} cannot be simulated: robots of MuJoCo have viscous and Coulomb friction alone; use IV, "
+                "which does without them, an estimator that does not simulate, or leave these laws out"
+            )
+        # Robot by robot: a product of all of them at once would have other bits for other numbers of robots.
+        standard = self.filed + np.matmul(self._back, (base - grouping.base(self.filed))[..., None])[..., 0]
+        try:
+            values: dict[str, Array] = dict(zip(grouping.standard.names, standard.T, strict=True))
+            values |= {p.name: values[other.name] for p, other in grouping.standard.tied.items() if other.name in values}
+            return model_fields(self.robot, {name: x for name, x in values.items() if name in self.given})
+        except BenchError as error:
+            raise IdentificationError(f"a robot with these parameters cannot be simulated: {error}") from error
+
+    @cached_property
+    def _back(self) -> Array:
+        """Changes of the standard parameters, least as shares of themselves, with which each base parameter changes by one."""
+        scale = np.where(self.filed == 0, 1.0, np.abs(self.filed))
+        return scale[:, None] * np.linalg.pinv(self.grouping.K * scale)
 
     def _tied(self, basis: Basis) -> Basis:
         """Return a basis with the parameters tied that are said to be equal; ExperimentError if that makes no sense."""

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Self
 
 import numpy as np
@@ -16,9 +15,7 @@ from idbench.sim.engine.simulation import simulate
 from idbench.sim.errors import BenchError
 from idbench.sim.frictions import CoulombViscous
 from idbench.sim.robot.payload import Payload
-from idbench.sim.robot.robot import Robot
-from idbench.sim.robot.tree import kinematic_tree, standard_parameters
-from idbench.sim.robot.varied import model_fields
+from idbench.sim.robot.tree import kinematic_tree
 from idbench.sim.scenario.measurement import Ripple, TorqueMeasurement
 from idbench.sim.scenario.scenario import Scenario
 from idbench.sim.trajectories import Reference
@@ -27,59 +24,6 @@ IMPOSSIBLE = "; if the loop is right, the parameters are not physically consiste
 """What else it may be."""
 
 SAME = 1e-6  # Share by which frequencies that are the same differ at most
-
-
-@dataclass(frozen=True, eq=False)
-class Fields:
-    """MuJoCo's model of a robot with parameters of its basis."""
-
-    robot_model: RobotModel
-    """The robot."""
-
-    @cached_property
-    def robot(self) -> Robot:
-        """The robot as its file describes it."""
-        return self.robot_model.robot
-
-    def of(self, X: Array, *, exact: bool = True) -> dict[str, Array]:
-        """Return the fields of robots with parameters X, shape (nsim, p): those nearest to the file's standard parameters.
-
-        Parameters that these robots do not have are an error if they must be exact, and left out otherwise.
-
-        Raises
-        ------
-        IdentificationError
-            If a parameter is of a law of friction that the simulated robot does not have.
-        """
-        grouping = self.robot_model.grouping
-        base = np.zeros((len(X), len(grouping.names)))
-        base[:, [grouping.basis.places[parameter] for parameter in self.robot_model.basis.parameters]] = X
-        given = np.array([self._given.get(name, 0.0) for name in grouping.standard.names])
-        unknown = [name for name in grouping.standard.names if name not in self._given]
-        if unknown and exact:
-            raise IdentificationError(
-                f"{', '.join(unknown)} cannot be simulated: robots of MuJoCo have viscous and Coulomb friction alone; use IV, "
-                "which does without them, an estimator that does not simulate, or leave these laws out"
-            )
-        # Robot by robot: a product of all of them at once would have other bits for other numbers of robots.
-        standard = given + np.matmul(self._back, (base - grouping.base(given))[..., None])[..., 0]
-        try:
-            values: dict[str, Array] = dict(zip(grouping.standard.names, standard.T, strict=True))
-            values |= {p.name: values[other.name] for p, other in grouping.standard.tied.items() if other.name in values}
-            return model_fields(self.robot, {name: x for name, x in values.items() if name in self._given})
-        except BenchError as error:
-            raise IdentificationError(f"a robot with these parameters cannot be simulated: {error}") from error
-
-    @cached_property
-    def _given(self) -> dict[str, float]:
-        return standard_parameters(self.robot)
-
-    @cached_property
-    def _back(self) -> Array:
-        grouping = self.robot_model.grouping
-        given = np.array([self._given.get(name, 0.0) for name in grouping.standard.names])
-        scale = np.where(given == 0, 1.0, np.abs(given))
-        return scale[:, None] * np.linalg.pinv(grouping.K * scale)
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +60,7 @@ class ScenarioLoop(AbstractLoop):
     def repeat(self, X: Array, *, informed: bool = False, exact: bool = True) -> Simulated:
         """Return the logs that robots with these parameters give."""
         flat = X.reshape(-1, X.shape[-1])
-        vary, failures = self._fields.of(flat, exact=exact), dict[tuple[int, ...], str]()
+        vary, failures = self.robot_model.fields(flat, exact=exact), dict[tuple[int, ...], str]()
         made = [self._log(k, X.shape[:-1], vary, failures, informed=informed) for k in range(len(self.logs))]
         return Simulated(tuple(made), failures)
 
@@ -137,10 +81,6 @@ class ScenarioLoop(AbstractLoop):
         q, tau = (x[:, :samples].reshape(*shape, samples, x.shape[-1]) for x in (run.log.q, run.log.tau))
         return replace(run.log, q=q, tau=tau, conditions={})
 
-    @cached_property
-    def _fields(self) -> Fields:
-        return Fields(self.robot_model)
-
 
 @dataclass(frozen=True, eq=False)
 class RobotPlant(AbstractPlant):
@@ -152,13 +92,9 @@ class RobotPlant(AbstractPlant):
     def shoot(self, X: Array, q: Array, qd: Array, log: MotionLog, first: npt.NDArray[np.intp], count: int) -> Array:
         """Return the positions of robots that start somewhere in a log."""
         try:
-            return shoot(self._fields.robot, self._fields.of(X), (q, qd), log, first, count)
+            return shoot(self.robot_model.robot, self.robot_model.fields(X), (q, qd), log, first, count)
         except BenchError as error:
             raise IdentificationError(f"the robot cannot be simulated: {error}") from error
-
-    @cached_property
-    def _fields(self) -> Fields:
-        return Fields(self.robot_model)
 
 
 def noiseless(scenario: Scenario) -> Scenario:
