@@ -32,11 +32,6 @@ class WrittenRobot:
         return consistent_of(self.fit.robot_model, self.fit.estimates[self.model])
 
     @cached_property
-    def robot(self) -> Robot:
-        """The robot of the file."""
-        return compiled(self.fit.robot_model.name, self.text())
-
-    @cached_property
     def values(self) -> dict[str, float]:
         """The standard parameters by name; those that were not asked for are zero."""
         found, robot_model = self.consistent, self.fit.robot_model
@@ -47,8 +42,8 @@ class WrittenRobot:
         robot_model = self.fit.robot_model
         return rewritten(robot_model.name, self.values, folder, robot_model.mounting)
 
-    def without_friction(self, joints: Collection[int]) -> Robot:
-        """Return the robot without the friction of some joints."""
+    def robot(self, joints: Collection[int]) -> Robot:
+        """Return the robot of the file, without the friction of some joints."""
         robot_model = self.fit.robot_model
         of_joints = (p for p in robot_model.grouping.standard.parameters if p.joint in joints and p.kind in FRICTION)
         none = {p.name: 0.0 for p in of_joints}
@@ -59,7 +54,8 @@ class WrittenRobot:
         """What is wrong about it."""
         messages = []
         if not self.consistent.agrees:
-            joints, off = self.fit.robot_model.robot.joints, 100 * self.torque_off
+            joints = self.fit.robot_model.robot.joints
+            off = 100 * self._share(self.consistent.base, self.fit.estimates[self.model].X)
             far = ", ".join(f"{joint} {x:.2g} %" for joint, x in zip(joints, off, strict=True) if x > LITTLE)
             messages.append(
                 f"the estimate of the {self.model} model is not physically consistent; torques of the nearest robot that is "
@@ -71,11 +67,6 @@ class WrittenRobot:
             names = ", ".join([*others, *(["smooth functions of friction"] if smooth & self.lost.keys() else [])])
             messages.append(f"{names} have no place in the file and are left out")
         return messages
-
-    @property
-    def torque_off(self) -> Array:
-        """Rms of the torque by which the robot differs from the estimate, over that of the log, shape (joint,)."""
-        return self._share(self.consistent.base, self.fit.estimates[self.model].X)
 
     def share_of(self, names: Collection[str]) -> Array:
         """Return the rms torque that standard parameters make, over that of the log, shape (joint,)."""

@@ -231,7 +231,7 @@ class HeldOut:
         # Sizes of laws are those at their shapes.
         apart = {p: x for p, x in X.items() if (p in lost or (p.joint in joints and p.kind in FRICTION)) and p.kind != SHAPE}
         log = _without(_without(log, qd, basis, apart), qd, *self._grouped(written))
-        return written.without_friction(joints) if joints else written.robot, log, qd
+        return written.robot(joints), log, qd
 
     def _grouped(self, written: WrittenRobot) -> tuple[Basis, dict[Parameter, float]]:
         """Return standard parameters that have no place in a simulated robot and stand in no base parameter of their own."""
