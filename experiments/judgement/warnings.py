@@ -1,6 +1,6 @@
 """What is suspicious about what was identified from a log, and what would help."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from idbench.experiments.identification.log_warnings import resting, unlike_file
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.note import Note
 from idbench.identify import MotionLog, brisk_shares, showing_moves
-from idbench.identify.basis.block import NOT_NEGATIVE, named
+from idbench.identify.basis.block import NOT_NEGATIVE, Kind, named
 from idbench.identify.data.motion_log import never_logged
 from idbench.sim.robot.robot import Robot
 from idbench.sim.robot.time_steps import apparent_rotor_inertia
@@ -27,6 +27,7 @@ MUCH_LONGER = 100  # Times from which on the length of a log is not what is wron
 FAR = 4.0  # Errors of more than so many sigma are marked: normal ones come once in 16 000
 WEAK = 0.5  # Share of its value that the sigma of a parameter may have before it is marked as weak
 ALIKE = 0.1  # Share of what an integrator makes of damping by which rotors of a simulation differ from the file's beside that
+SIGNIFICANT = 2.0  # A value this many of the estimator's own sigma below zero that cannot be is a mistake, not an error
 LINK_SIDE = 3.0  # A rotor's inertia this many sigma below zero is impossible: the torques do not contain the rotor
 OPEN = 0.02  # Share of a joint's torque on a brisk motion that one sigma of a parameter may make before it counts as left open
 
@@ -74,13 +75,7 @@ def _seems_simulated(fit: Fit) -> Iterator[str]:
 
 def _link_side(fit: Fit) -> Iterator[str]:
     """Yield whether torques look like those of the links, behind gears and rotors: these take rotors out, as it were."""
-    estimate = next(iter(fit.estimates.values()))
-    rotors = [
-        name
-        for p, name, x, sigma in zip(fit.basis.parameters, estimate.names, estimate.X, estimate.own_sigma, strict=True)
-        if p.kind == "rotor inertia" and x < -LINK_SIDE * sigma
-    ]
-    if rotors:
+    if rotors := _negative(fit, fit.leading, {"rotor inertia"}, LINK_SIDE):
         yield (
             f"{', '.join(rotors)} more than {LINK_SIDE:g} sigma below zero: are these torques measured at the links, behind "
             "the gears? Then add --armature none; if not, their meaning or delay is wrong"
@@ -114,11 +109,11 @@ def used(marks: Mapping[str, Sequence[Sequence[str]]]) -> list[str]:
     return [flag for flag in FLAGS if flag in there]
 
 
-def _negative(fit: Fit, model: str) -> list[str]:
-    """Return parameters that must be positive and are significantly negative."""
+def _negative(fit: Fit, model: str, kinds: Collection[Kind] = NOT_NEGATIVE, times: float = SIGNIFICANT) -> list[str]:
+    """Return parameters of kinds that must be positive and are significantly negative, by so many sigma."""
     estimate = fit.estimates[model]
-    friction = zip(fit.basis.parameters, estimate.X, estimate.own_sigma, strict=True)
-    return [p.name for p, x, sigma in friction if p.kind in NOT_NEGATIVE and _surely_negative(x, sigma)]
+    values = zip(fit.basis.parameters, estimate.X, estimate.own_sigma, strict=True)
+    return [p.name for p, x, sigma in values if p.kind in kinds and x < -times * sigma]
 
 
 def _too_little(fit: Fit, name: str) -> Iterator[str]:
@@ -199,11 +194,12 @@ def wrong_sign(fit: Fit) -> list[Note]:
     values = zip(fit.basis.parameters, estimate.X, estimate.own_sigma, strict=True)
     known = {(p.kind, p.joint): (x, sigma) for p, x, sigma in values}
     nothing = (0.0, 0.0)
-    wrong = [
-        joint
-        for j, joint in enumerate(fit.robot_model.robot.joints)
-        if known.get(("viscous friction", j), nothing)[0] < 0 and _surely_negative(*known.get(("Coulomb friction", j), nothing))
-    ]
+    wrong = list[str]()
+    for j, joint in enumerate(fit.robot_model.robot.joints):
+        viscous, _ = known.get(("viscous friction", j), nothing)
+        coulomb, sigma = known.get(("Coulomb friction", j), nothing)
+        if viscous < 0 and coulomb < -SIGNIFICANT * sigma:
+            wrong.append(joint)
     if not wrong:
         return []
     work = _work(fit.logs.fitted[0])
@@ -211,11 +207,6 @@ def wrong_sign(fit: Fit) -> list[Note]:
     finding = f"friction drives {', '.join(wrong)} in the {model} model{balance}"
     asked = "does the torque have the wrong sign (it must be that on the joint, positive where it speeds up a positive motion)?"
     return [Note(f"{finding}: {asked}", finding=finding)]
-
-
-def _surely_negative(x: float, sigma: float) -> bool:
-    """True if a value is negative by the estimator's own sigma: an impossible value is a mistake, not an error."""
-    return x < -2 * sigma
 
 
 def _work(log: MotionLog) -> float:
@@ -251,12 +242,8 @@ def _moves(robot_model: RobotModel, names: Sequence[str]) -> str:
     moves: dict[tuple[int, ...], list[str]] = {}
     for name, joints in showing_moves(robot_model.tree, robot_model.grouping, names).items():
         moves.setdefault(joints, []).append(name)
-    each = [f"{', '.join(shown)} (move {_joints(robot_model, joints)})" for joints, shown in sorted(moves.items(), key=_size)]
-    return "; ".join(each)
-
-
-def _size(move: tuple[tuple[int, ...], list[str]]) -> int:
-    return len(move[0])
+    few_first = sorted(moves.items(), key=lambda move: len(move[0]))
+    return "; ".join(f"{', '.join(shown)} (move {_joints(robot_model, joints)})" for joints, shown in few_first)
 
 
 def _joints(robot_model: RobotModel, joints: Sequence[int]) -> str:
