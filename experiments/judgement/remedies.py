@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -82,68 +82,63 @@ def delay_advice(result: Fit) -> Iterator[str]:
         )
 
 
-@dataclass(frozen=True, eq=False)
-class Remedies:
-    """Options of identification, tried on a held-out log."""
+def remedies(held_out: HeldOut) -> Iterator[str]:
+    """Yield options with which the error of a fit on a held-out log falls, and how far."""
+    request = held_out.fit.request
+    before = least = _worst(held_out, request)
+    begin, tried = time.perf_counter(), 0
+    for option, make in _others(held_out).items():
+        spent = time.perf_counter() - begin
+        if spent > MOST_TIME or (option == AUTO and spent * AUTO_FITS > MOST_TIME * max(tried, 1)):
+            continue
+        if option == AUTO and least < TOLERABLE:  # what is well enough is not worth the time
+            continue
+        tried += 1
+        try:
+            with stage(f"trying {option}"):
+                after = _worst(held_out, replace(request, robot_model=make()))
+        except (IdentificationError, ExperimentError, BenchError):
+            continue
+        if option == AUTO and after > WORTH * least:  # it finds what the others say, too
+            continue
+        least = min(least, after)
+        if after < min(WORTH * before, TOLERABLE) or after < DRASTIC * before:
+            fall = f"from {error_percentage(before)} to {error_percentage(after)}"
+            yield Note(f"with {option} the worst joint's error falls {fall}", option=option)
 
-    held_out: HeldOut
-    """The fit that is to be mended, on a held-out log."""
 
-    def options(self) -> Iterator[str]:
-        """Yield options with which the error falls, and how far."""
-        request = self.held_out.fit.request
-        before = least = self._worst(request)
-        begin, tried = time.perf_counter(), 0
-        for option, make in self._others().items():
-            spent = time.perf_counter() - begin
-            if spent > MOST_TIME or (option == AUTO and spent * AUTO_FITS > MOST_TIME * max(tried, 1)):
-                continue
-            if option == AUTO and least < TOLERABLE:  # what is well enough is not worth the time
-                continue
-            tried += 1
-            try:
-                with stage(f"trying {option}"):
-                    after = self._worst(replace(request, robot_model=make()))
-            except (IdentificationError, ExperimentError, BenchError):
-                continue
-            if option == AUTO and after > WORTH * least:  # it finds what the others say, too
-                continue
-            least = min(least, after)
-            if after < min(WORTH * before, TOLERABLE) or after < DRASTIC * before:
-                fall = f"from {error_percentage(before)} to {error_percentage(after)}"
-                yield Note(f"with {option} the worst joint's error falls {fall}", option=option)
+def _others(held_out: HeldOut) -> dict[str, Callable[[], RobotModel]]:
+    """Return the options, and what makes the robot that each describes."""
+    request, found = held_out.fit.request, dict[str, Callable[[], RobotModel]]()
+    robot_model = request.robot_model
+    asked = robot_model.asked
+    mounting = robot_model.mounting
+    joints = robot_model.robot.joints
+    known = asked.prior or "links=file" in asked.hold
+    if not known and request.solver.takes_prior and not robot_model.basis.is_nonlinear:  # which takes minutes
+        found["--prior file"] = lambda: replace(robot_model, asked=replace(asked, prior=("file",)))
+    if not all(joint.armature for joint in robot_model.tree.joints):
+        found["--armature all"] = lambda: replace(robot_model, asked=replace(asked, armature="all"))
+    if "offset" not in asked.add:
+        found["--add offset"] = lambda: replace(robot_model, asked=replace(asked, add=(*asked.add, "offset")))
+    if len(joints) > 1 and not robot_model.tree.couplings:
+        drive = f"motor{len(joints)}", ((joints[-2], 1.0), (joints[-1], 1.0))
+        option = f"--coupling {drive[0]}={joints[-2]}+{joints[-1]}"
+        found[option] = lambda: replace(robot_model, mounting=replace(mounting, couplings=(drive,)))
+    if robot_model.laws.standard and asked.friction == ("standard",):
+        found[AUTO] = lambda: chosen_friction(request, held_out.fit.logs.fitted, most=1)[0].robot_model
+    return found
 
-    def _others(self) -> dict[str, Callable[[], RobotModel]]:
-        """Return the options, and what makes the robot that each describes."""
-        request, found = self.held_out.fit.request, dict[str, Callable[[], RobotModel]]()
-        robot_model = request.robot_model
-        asked = robot_model.asked
-        mounting = robot_model.mounting
-        joints = robot_model.robot.joints
-        known = asked.prior or "links=file" in asked.hold
-        if not known and request.solver.takes_prior and not robot_model.basis.is_nonlinear:  # which takes minutes
-            found["--prior file"] = lambda: replace(robot_model, asked=replace(asked, prior=("file",)))
-        if not all(joint.armature for joint in robot_model.tree.joints):
-            found["--armature all"] = lambda: replace(robot_model, asked=replace(asked, armature="all"))
-        if "offset" not in asked.add:
-            found["--add offset"] = lambda: replace(robot_model, asked=replace(asked, add=(*asked.add, "offset")))
-        if len(joints) > 1 and not robot_model.tree.couplings:
-            drive = f"motor{len(joints)}", ((joints[-2], 1.0), (joints[-1], 1.0))
-            option = f"--coupling {drive[0]}={joints[-2]}+{joints[-1]}"
-            found[option] = lambda: replace(robot_model, mounting=replace(mounting, couplings=(drive,)))
-        if robot_model.laws.standard and asked.friction == ("standard",):
-            found[AUTO] = lambda: chosen_friction(request, self.held_out.fit.logs.fitted, most=1)[0].robot_model
-        return found
 
-    def _worst(self, request: Request) -> float:
-        """Return the largest error [%] of the explicit model on the held-out log."""
-        if request.robot_model.share_sought:
-            request = replace(request, share=chosen_share(request, self.held_out.fit.logs.fitted))
-        problem = request.problem(self.held_out.fit.logs.fitted)
-        solver = WeightedLeastSquares() if request.simulates else request.solver  # simulation takes far too long to try with
-        X = estimate(problem, solver).X
-        unseen = replace(self.held_out, fit=replace(self.held_out.fit, request=request, problem=problem)).problem
-        return float(np.nanmax(validate(unseen, X).percent))
+def _worst(held_out: HeldOut, request: Request) -> float:
+    """Return the largest error [%] of the explicit model on the held-out log."""
+    if request.robot_model.share_sought:
+        request = replace(request, share=chosen_share(request, held_out.fit.logs.fitted))
+    problem = request.problem(held_out.fit.logs.fitted)
+    solver = WeightedLeastSquares() if request.simulates else request.solver  # simulation takes far too long to try with
+    X = estimate(problem, solver).X
+    unseen = replace(held_out, fit=replace(held_out.fit, request=request, problem=problem)).problem
+    return float(np.nanmax(validate(unseen, X).percent))
 
 
 def checks(judgement: Judgement, *, delay: bool, trials: bool = True) -> dict[str, list[str]]:
@@ -171,7 +166,7 @@ def checks(judgement: Judgement, *, delay: bool, trials: bool = True) -> dict[st
     if hardest is not None and not result.logs.long:
         # Friction absorbs a wrong delay, and the verdict may be good: the log itself is asked.
         found[DELAY] += delay_advice(result) if delay else ()
-        found[MODEL] += Remedies(hardest).options() if trials and not judgement.good else ()
+        found[MODEL] += remedies(hardest) if trials and not judgement.good else ()
     late = [("delay", "torque", None)] if any(noted(advice).option for advice in found[DELAY]) else []
     of_model = (c for c in result.diagnosis or () if (c.suspect.cause, c.suspect.of, c.suspect.joint) not in late)
     found[MODEL] += [cause.advice for cause in of_model]

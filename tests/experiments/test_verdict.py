@@ -12,7 +12,7 @@ from idbench.experiments.identification.logs import Logs
 from idbench.experiments.identification.request import Request
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.judgement.held_out import on_log
-from idbench.experiments.judgement.remedies import Remedies, delay_advice
+from idbench.experiments.judgement.remedies import delay_advice, remedies
 from idbench.experiments.judgement.warnings import warnings_of_result
 from idbench.experiments.requests.shared import Parameters
 from idbench.identify import MotionLog
@@ -106,9 +106,9 @@ def test_a_wrong_delay_is_named_by_the_log_itself(pair):
 @pytest.mark.thorough
 def test_options_are_advised_that_help_and_by_how_much(pair):
     moved = [torques(log, lambda tau: tau + 0.2 * level(pair[0])) for log in pair]
-    found = list(Remedies(validated(moved)).options())
+    found = list(remedies(validated(moved)))
     assert [text.split()[1:3] for text in found] == [["--add", "offset"]]
-    assert not list(Remedies(validated(pair)).options())
+    assert not list(remedies(validated(pair)))
 
 
 @pytest.mark.parametrize("models", [("power", "explicit"), ("explicit", "power")])
