@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import asdict, replace
-from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -10,6 +9,7 @@ import numpy as np
 from idbench.experiments.identification.friction_laws import COMPARED, law_of
 from idbench.experiments.identification.logs import Logs
 from idbench.experiments.identification.request import Request
+from idbench.experiments.results.writing import finite
 from idbench.identify import MotionLog, Problem
 from idbench.identify.arrays import TINY
 from idbench.identify.basis.block import Parameter
@@ -104,8 +104,5 @@ def words(choice: FrictionChoice, laws: Sequence[Sequence[str]], joints: Sequenc
 
 def summary(choice: FrictionChoice) -> list[dict[str, Any]]:
     """Summary of the comparison."""
-    return [{name: _finite(x) for name, x in (asdict(score) | {"joint": score.joint + 1}).items()} for score in choice.scores]
-
-
-def _finite(x: Any) -> Any:
-    return None if isinstance(x, float) and not isfinite(x) else x
+    rows = (asdict(score) | {"joint": score.joint + 1} for score in choice.scores)
+    return [{name: finite(x) if isinstance(x, float) else x for name, x in row.items()} for row in rows]

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from idbench.experiments.identification.fit import Fit
+from idbench.experiments.results.writing import finite
 from idbench.identify import Estimate, InstrumentalVariables, WeightedLeastSquares, noise_in_rows
 from idbench.identify import estimate as identified_by
 from idbench.identify.judge.excitation import LEVEL
@@ -52,19 +53,13 @@ def iterations(fit: Fit) -> dict[str, Any]:
     return {
         model: {
             "simulations": None if e.simulations is None else int(e.simulations),
-            "path": [[float(x) if np.isfinite(x) else None for x in X] for X in e.path],
-            **(_test(fit, model) if isinstance(fit.solver, InstrumentalVariables) else {}),
+            "path": [[finite(x) for x in X] for X in e.path],
+            **({"noise_in_W": _test(e)} if isinstance(fit.solver, InstrumentalVariables) else {}),
         }
         for model, e in every.items()
     }
 
 
-def _test(fit: Fit, model: str) -> dict[str, Any]:
-    test = noise_in_rows(fit.estimates[model])
-    return {
-        "noise_in_W": {
-            "matters": bool(test.matters),
-            "probability": float(test.probability),
-            "off_by_sigma": test.off.tolist(),
-        }
-    }
+def _test(estimate: Estimate) -> dict[str, Any]:
+    test = noise_in_rows(estimate)
+    return {"matters": bool(test.matters), "probability": float(test.probability), "off_by_sigma": test.off.tolist()}

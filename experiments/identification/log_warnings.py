@@ -78,7 +78,7 @@ STILL = 1e-3  # A joint that travels less than this share of what the busiest do
 def warnings_of_log(log: MotionLog, tree: KinematicTree) -> list[str]:
     """Suspicions about a log: jumps, degrees, millimetres, places that a joint cannot reach, joints at rest."""
     found = list(_of_jumps(log, tree))
-    jumping = {jump.joint for jump in _jumps(log)}
+    jumping = {jump.joint for jump in jumps_of(log)}
     by_reason = dict[str, list[str]]()
     for j, (joint, q) in enumerate(zip(tree.joints, log.q.reshape(-1, log.n).T, strict=True)):
         ends = np.array([q.min(), q.max()])
@@ -96,18 +96,14 @@ def unchanging(log: MotionLog, tree: KinematicTree) -> list[str]:
     return [f"the torque of {dead} never changes: is it logged?"] if dead else []
 
 
-def unusable(log: MotionLog) -> bool:
-    """True if positions of a log jump, so that no advice can be drawn from it."""
-    return bool(_jumps(log))
-
-
-def _jumps(log: MotionLog) -> list[Jump]:
+def jumps_of(log: MotionLog) -> list[Jump]:
+    """Jumps of the positions of a log; of many runs, and of poses, none are looked for."""
     return jumps(log.q, log.fs) if log.q.ndim == 2 and not log.poses else []
 
 
 def _of_jumps(log: MotionLog, tree: KinematicTree) -> Iterator[str]:
     """Yield the first jumps of a log, by joint, sample and speed."""
-    every = _jumps(log)
+    every = jumps_of(log)
     for jump in every[:MOST_JUMPS]:
         slide = tree.joints[jump.joint].kind == "slide"
         unit, k = "m" if slide else "rad", jump.sample

@@ -115,11 +115,6 @@ class Request:
         return self.method[1] if self.method else ESTIMATORS.create(self.estimator)
 
     @property
-    def simulates(self) -> bool:
-        """Whether its estimator simulates the robot."""
-        return bool({"loop", "plant"} & self.solver.needs)
-
-    @property
     def label(self) -> str:
         """What distinguishes this identification from others of the same log."""
         return self.name or f"{self.chain}-{self.estimator}"

@@ -63,7 +63,12 @@ class ScenarioRun:
         robot, friction = self.run.robots[0], self.scenario.friction
         truth, log = friction.truth(robot) | self.request.robot_model.truth(robot, friction), self.run.alone()
         if not np.any(log.tau):
-            raise ExperimentError(f"scenario {self.scenario.name}: all torques of the log are 0: {self._why_nothing}")
+            step = max(self.scenario.torque.resolution)
+            coarse = (
+                f"torque.resolution = {step:g} N m is coarser than all of them: give a smaller one, or 0 for an exact converter"
+            )
+            why = coarse if step else "nothing acts on the joints"
+            raise ExperimentError(f"scenario {self.scenario.name}: all torques of the log are 0: {why}")
         return fit(replace(self.request, loops=(self.scenario,)), Logs((log,), truth=truth))
 
     @cached_property
@@ -75,15 +80,6 @@ class ScenarioRun:
             if not is_mistake(error):
                 raise
             return None
-
-    @property
-    def _why_nothing(self) -> str:
-        """What makes all torques zero."""
-        step = max(self.scenario.torque.resolution)
-        coarse = (
-            f"torque.resolution = {step:g} N m is coarser than all of them: give a smaller one, or 0 for an exact converter"
-        )
-        return coarse if step else "nothing acts on the joints"
 
     def summary(self) -> dict[str, Any]:
         """Return summary.json."""

@@ -9,7 +9,7 @@ import numpy as np
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.fit import Fit
 from idbench.experiments.identification.friction_choice import chosen_friction
-from idbench.experiments.identification.log_warnings import unchanging, unusable, warnings_of_log
+from idbench.experiments.identification.log_warnings import jumps_of, unchanging, warnings_of_log
 from idbench.experiments.identification.logs import with_delay
 from idbench.experiments.identification.prior_share import chosen_share
 from idbench.experiments.identification.request import Request
@@ -135,8 +135,8 @@ def _worst(held_out: HeldOut, request: Request) -> float:
     if request.robot_model.share_sought:
         request = replace(request, share=chosen_share(request, held_out.fit.logs.fitted))
     problem = request.problem(held_out.fit.logs.fitted)
-    solver = WeightedLeastSquares() if request.simulates else request.solver  # simulation takes far too long to try with
-    X = estimate(problem, solver).X
+    simulates = {"loop", "plant"} & request.solver.needs  # which takes far too long to try with
+    X = estimate(problem, WeightedLeastSquares() if simulates else request.solver).X
     unseen = replace(held_out, fit=replace(held_out.fit, request=request, problem=problem)).problem
     return float(np.nanmax(validate(unseen, X).percent))
 
@@ -157,7 +157,7 @@ def checks(judgement: Judgement, *, delay: bool, trials: bool = True) -> dict[st
     of_logs = list(warnings_of_logs(judgement))
     found: dict[str, list[str]] = {LOG: of_logs, DELAY: [], FILE: undescribed(result.robot_model.robot)}
     found |= {MOTION: [], MODEL: []}
-    if any(map(unusable, result.logs.fitted)):  # all else may be its doing
+    if any(map(jumps_of, result.logs.fitted)):  # all else may be their doing: no advice can be drawn from it
         return found
     found[MOTION] += hidden_notes(result)
     for about, warnings in warnings_of_result(result).items():
