@@ -76,20 +76,15 @@ def fit(request: Request, logs: Logs) -> Fit:
 
 
 def _shown(request: Request, logs: Logs, problem: Problem) -> Fit:
-    """Return the fit of the parameters that the logs show."""
-    found, hidden = _fit(request, logs, problem), list[str]()
+    """Return the fit of the parameters that the logs show: those that the leading model finds hidden are left out."""
+    models = {name: MODELS.create(name) for name in request.models}
+    found = Fit(request, logs, problem, attempt_each(problem, models, request.solver))
     leading = next(iter(found.outcomes.values()))
-    while isinstance(leading, ExcitationError) and leading.hidden and len(leading.hidden) < len(found.basis.names):
-        hidden += leading.hidden
-        request = replace(found.request, robot_model=found.robot_model.without(leading.hidden))
-        found = _fit(request, logs, request.problem(logs.fitted))
-        leading = next(iter(found.outcomes.values()))
-    return replace(found, hidden=tuple(hidden))
-
-
-def _fit(request: Request, logs: Logs, problem: Problem) -> Fit:
-    found = attempt_each(problem, {name: MODELS.create(name) for name in request.models}, request.solver)
-    return Fit(request, logs, problem, found)
+    if not isinstance(leading, ExcitationError) or not 0 < len(leading.hidden) < len(found.basis.names):
+        return found
+    request = replace(request, robot_model=found.robot_model.without(leading.hidden))
+    fewer = _shown(request, logs, request.problem(logs.fitted))
+    return replace(fewer, hidden=(*leading.hidden, *fewer.hidden))
 
 
 def _silent(found: Fit) -> Suspect | None:
