@@ -130,11 +130,10 @@ class Cause:
     def words(self) -> str:
         """What is wrong, how sure, and what else it may be."""
         suspect, wording = self.suspect, self._wording
-        what = wording.what.format(**self._values)
         t = "" if np.isinf(suspect.t) else f" ({suspect.t:.0f} sigma)"
         others = ", ".join(dict.fromkeys(map(self._named, suspect.alternatives)))
         before = f"{self.joint}: " if self.joint else "all torques: " if wording.what.startswith("torque") else ""
-        return f"{before}{what}{t}{f'; or {others}, which this log cannot distinguish' if others else ''}"
+        return f"{before}{self.short}{t}{f'; or {others}, which this log cannot distinguish' if others else ''}"
 
     @property
     def short(self) -> str:

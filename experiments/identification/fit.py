@@ -248,6 +248,5 @@ class Fit:
 
 def _rms_by_kind(rows: Rows, X: Array) -> Array:
     """Return the rms of the valid residuals of each joint, shape (joint,)."""
-    residual, valid = rows.by_kind((rows.Y - rows.predicted(X)) * rows.valid), rows.by_kind(rows.valid)
-    count = valid.sum(axis=-1)
+    residual, count = rows.by_kind((rows.Y - rows.predicted(X)) * rows.valid), rows.count
     return np.sqrt(np.divide(np.sum(residual**2, axis=-1), count, out=np.full(len(count), np.nan), where=count > 0))

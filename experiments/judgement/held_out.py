@@ -59,7 +59,8 @@ class Verdict:
         """good, fair or poor; unsure where noise or sigma would hide a poor model. None is good that shows a mistake."""
         if self.wrong or any(cause.suspect.cause == "sign" for cause in self.causes):
             return "poor"
-        beyond, hidden = (_worst(self.validation.percent_of_level(x)) for x in (self.validation.excess, self._hidden))
+        shares = (self.validation.percent_of_level(x) for x in (self.validation.excess, self._hidden))
+        beyond, hidden = (np.fmax.reduce(share, initial=0.0) for share in shares)  # without what is not known
         if beyond > FAIR:
             return "poor"
         if hidden > FAIR or not np.isfinite(self.validation.percent).any():
@@ -111,11 +112,6 @@ class Verdict:
         """Its part of summary.json."""
         apart = [f"not simulated: {self.unsimulated}"] if self.unsimulated else []
         return {"verdict": self.word, "reasons": [*self.reasons, *apart]}
-
-
-def _worst(shares: Array) -> float:
-    """Return the largest of some percentages; what is not known is none."""
-    return float(np.max(shares, initial=0.0, where=~np.isnan(shares)))
 
 
 BANDWIDTH = 5.0  # Of the loop that holds the simulated robot to the log [rad/s]: weak, so that errors of the model show

@@ -154,8 +154,7 @@ def checks(judgement: Judgement, *, delay: bool, trials: bool = True) -> dict[st
         Whether other options are tried on the held-out data where no model is good.
     """
     result = judgement.fit
-    of_logs = list(warnings_of_logs(judgement))
-    found: dict[str, list[str]] = {LOG: of_logs, DELAY: [], FILE: undescribed(result.robot_model.robot)}
+    found = {LOG: warnings_of_logs(judgement), DELAY: [], FILE: undescribed(result.robot_model.robot)}
     found |= {MOTION: [], MODEL: []}
     if any(map(jumps_of, result.logs.fitted)):  # all else may be their doing: no advice can be drawn from it
         return found
@@ -173,15 +172,15 @@ def checks(judgement: Judgement, *, delay: bool, trials: bool = True) -> dict[st
     return found
 
 
-def warnings_of_logs(judgement: Judgement) -> Iterator[str]:
-    """Yield what is suspicious about the logs, fitted and held out."""
+def warnings_of_logs(judgement: Judgement) -> list[str]:
+    """Return what is suspicious about the logs, fitted and held out."""
     logs, tree = judgement.fit.logs, judgement.fit.robot_model.tree
     several = len(logs.fitted) > 1
     every = [(f"{logs.name(k)}: " if several else "", log) for k, log in enumerate(logs.fitted)]
     every += [(f"{name}: ", log) for name, log in (logs.held_out or {}).items()]
     untested = judgement.fit.diagnosis is None
-    return (
+    return [
         Note(before + warning, option=noted(warning).option)
         for before, log in every
         for warning in (*warnings_of_log(log, tree), *(unchanging(log, tree) if untested else ()))
-    )
+    ]

@@ -171,9 +171,12 @@ def hidden_notes(fit: Fit) -> list[str]:
     still = [name for name in fit.hidden if name not in unlogged]
     joints = ", ".join(robot.robot.joints[j] for j in absent)
     notes = [f"without the torque of {joints}, {', '.join(lost)} are not shown: left out, as if zero"] if lost else []
-    moves = helpful_moves(robot, fit.logs.fitted[0], still) if still else ""
+    if not still:
+        return notes
+    at_rest = ", ".join(resting(fit.logs.fitted[0], robot.tree))
+    moves = f"{at_rest} never moves in this log: move it" if at_rest else _moves(robot, still)
     why = f" ({moves})" if moves else ""
-    return [*notes, *([f"this log does not excite {', '.join(still)}: left out, as if zero{why}"] if still else [])]
+    return [*notes, f"this log does not excite {', '.join(still)}: left out, as if zero{why}"]
 
 
 def warnings_of_robot(robot: Robot) -> list[str]:
@@ -228,13 +231,6 @@ def _poorly_known(fit: Fit) -> list[str]:
         return []
     return [f"poorly known in the {model} model (one sigma above {100 * OPEN:g} % of a brisk motion's torque): "
             f"{_moves(robot_model, names)}"]  # fmt: skip
-
-
-def helpful_moves(robot_model: RobotModel, log: MotionLog, names: Sequence[str]) -> str:
-    """Moves that would show hidden parameters; empty if unknown."""
-    if still := resting(log, robot_model.tree):
-        return f"{', '.join(still)} never moves in this log: move it"
-    return _moves(robot_model, names)
 
 
 def _moves(robot_model: RobotModel, names: Sequence[str]) -> str:
