@@ -31,9 +31,6 @@ from idbench.identify.signals.masks import slow_speed
 
 NOTHING = 1e-12  # Share of a torque's squares below which its variance is rounding
 
-Outcomes = dict[str, Estimate | IdentificationError]
-"""The estimate of every model, or why it has none."""
-
 
 @dataclass(frozen=True, eq=False)
 class Fit:
@@ -45,8 +42,8 @@ class Fit:
     """The logs."""
     problem: Problem
     """Logs, robot and chain, by the explicit model."""
-    outcomes: Outcomes
-    """What each model gives."""
+    outcomes: dict[str, Estimate | IdentificationError]
+    """The estimate of every model, or why it has none."""
     choice: FrictionChoice | None = None
     """What was compared, where laws of friction were chosen."""
     hidden: tuple[str, ...] = ()
@@ -132,7 +129,7 @@ class Fit:
             return self
         alone = replace(logs, fitted=logs.fitted[k : k + 1], names=logs.names[k : k + 1])
         problem = Problem(alone.fitted, self.basis, self.problem.model, self.processing)
-        seen: Outcomes = {
+        seen: dict[str, Estimate | IdentificationError] = {
             name: replace(e, problem=problem.with_model(e.problem.model), solution=None, calibrated=e.covariance, fits={})
             for name, e in self.estimates.items()
         }

@@ -141,21 +141,23 @@ class Logs:
         As they are if there is none.
         """
         found, estimated = dict[str, DelayEstimate](), DELAYS[self.delay_sought or "estimate"]
+        notes = [note for note in self.notes if noted(note).about != WITH_LAWS]
         for meaning in dict.fromkeys(log.torque.meaning for log in self.fitted):
             try:
                 found[meaning] = estimated([log for log in self.fitted if log.torque.meaning == meaning], basis, chain)
             except IdentificationError as error:
-                return replace(self, notes=(*self._notes, _with_laws(error))), False
+                return replace(self, notes=(*notes, _with_laws(error))), False
         said = ", ".join(each.words for each in found.values())
         first = next(iter(found.values()))
-        moved = any(_moved(log, found[log.torque.meaning]) for log in self.fitted)
+        fitted = [(log, found[log.torque.meaning]) for log in self.fitted]
+        moved = any(own.differs(log.torque, max(own.doubt, LEAST / log.fs)) for log, own in fitted)
         delayed = replace(
             self,
-            fitted=tuple(with_delay(log, found[log.torque.meaning]) for log in self.fitted),
+            fitted=tuple(with_delay(log, own) for log, own in fitted),
             held_out={
                 name: with_delay(log, found.get(log.torque.meaning, first)) for name, log in (self.held_out or {}).items()
             },
-            notes=(*self._notes, _with_laws(said)),
+            notes=(*notes, _with_laws(said)),
         )
         return delayed, moved
 
@@ -167,11 +169,6 @@ class Logs:
 
         held_out = self.held_out and {name: quiet(log) for name, log in self.held_out.items()}
         return replace(self, fitted=tuple(map(quiet, self.fitted)), held_out=held_out)
-
-    @property
-    def _notes(self) -> tuple[str, ...]:
-        """What was noted but for delays with other laws."""
-        return tuple(note for note in self.notes if noted(note).about != WITH_LAWS)
 
     @property
     def longest_name(self) -> str:
@@ -196,10 +193,6 @@ class Logs:
     def long(self) -> bool:
         """Whether they are too long for their rows to be kept."""
         return is_long(self.fitted)
-
-
-def _moved(log: MotionLog, found: DelayEstimate) -> bool:
-    return found.differs(log.torque, max(found.doubt, LEAST / log.fs))
 
 
 def with_delay(log: MotionLog, found: DelayEstimate) -> MotionLog:

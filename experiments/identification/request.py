@@ -77,12 +77,9 @@ class Request:
         if self.wdyn is not None and not 0 < self.wdyn[0] < np.inf:
             raise ExperimentError(f"--wdyn {self.wdyn[0]:g} must be above 0 [Hz], and finite")
         _ = self.robot_model.basis, self.processing, self.solver, [MODELS.create(name) for name in self.models]
-        if self.mask_speed and not isinstance(self.processing.mask, ReversalMask):
-            raise ExperimentError(
-                f"--mask-speed {' '.join(f'{x:g}' for x in self.mask_speed)}: --chain {self.chain} with these options masks "
-                "nothing; leave it out"
-            )
         n, given = self.robot_model.robot.n, " ".join(f"{x:g}" for x in self.mask_speed)
+        if self.mask_speed and not isinstance(self.processing.mask, ReversalMask):
+            raise ExperimentError(f"--mask-speed {given}: --chain {self.chain} with these options masks nothing; leave it out")
         if len(self.mask_speed) not in (0, 1, n) or not all(0 < x < np.inf for x in self.mask_speed):
             raise ExperimentError(f"--mask-speed {given} must be one speed above 0 for all {n} joints, or one for each")
         laws = self.robot_model.laws
