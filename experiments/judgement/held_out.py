@@ -220,19 +220,17 @@ class HeldOut:
         if log.poses:
             raise IdentificationError("poses at rest hold no motion")
         basis, estimate = self.fit.basis, self.fit.estimates[model].X.tolist()
-        lost = {p for p in basis.parameters if p.name in written.lost}
+        standard, values = self.fit.robot_model.grouping.standard, written.lost
+        lost = {p for p in basis.parameters if p.name in values}
         X = dict(zip(basis.parameters, estimate, strict=True))
         negative = {p.joint for p, x in X.items() if p.kind in FRICTION & NOT_NEGATIVE and x < 0}
         joints = {p.joint for p in lost if p.kind in FRICTION and p.joint is not None} & negative
         # Sizes of laws are those at their shapes.
         apart = {p: x for p, x in X.items() if (p in lost or (p.joint in joints and p.kind in FRICTION)) and p.kind != SHAPE}
-        log = _without(_without(log, qd, basis, apart), qd, *self._grouped(written))
+        # Standard parameters may have no place in a simulated robot and stand in no base parameter of their own.
+        grouped = {p: values[p.name] for p in standard.parameters if p.name in values.keys() - set(basis.names)}
+        log = _without(_without(log, qd, basis, apart), qd, standard, grouped)
         return written.robot(joints), log, qd
-
-    def _grouped(self, written: WrittenRobot) -> tuple[Basis, dict[Parameter, float]]:
-        """Return standard parameters that have no place in a simulated robot and stand in no base parameter of their own."""
-        standard, alone = self.fit.robot_model.grouping.standard, set(self.fit.basis.names)
-        return standard, {p: written.lost[p.name] for p in standard.parameters if p.name in written.lost.keys() - alone}
 
     @cached_property
     def _replayed(self) -> tuple[MotionLog, Array]:
