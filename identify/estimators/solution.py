@@ -14,11 +14,6 @@ class AbstractSolution(ABC):
     """X = G' Y, to first order."""
 
     @property
-    def known(self) -> Array | None:
-        """Rows of what is known before, in units of one sigma, shape (..., m, p + 1); None if nothing is."""
-        return None
-
-    @property
     def of_prior(self) -> Array:
         """Covariance of the error of X due to that of what is known before, shape (..., p, p)."""
         return np.zeros(())

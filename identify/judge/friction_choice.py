@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from idbench.identify.arrays import Array, combined
+from idbench.identify.arrays import TINY, Array, combined
 from idbench.identify.basis.basis import Basis
 from idbench.identify.basis.block import FRICTION, AbstractBlock
 from idbench.identify.basis.friction.laws import TanhFriction
@@ -14,7 +14,7 @@ from idbench.identify.basis.friction.shape import ShapedFriction
 from idbench.identify.basis.of_joints import OfJoints
 from idbench.identify.estimators.problem import Problem
 from idbench.identify.estimators.settle import settled
-from idbench.identify.judge.held_out import FOLDS, TINY, HeldOutProducts, sigma_squares, solved, squares
+from idbench.identify.judge.held_out import FOLDS, HeldOutProducts, sigma_squares, solved, squares
 from idbench.identify.signals.masks import NoMask
 from idbench.identify.signals.signals import State
 

@@ -7,7 +7,7 @@ from itertools import pairwise, product
 
 import numpy as np
 
-from idbench.identify.arrays import Array
+from idbench.identify.arrays import TINY, Array
 from idbench.identify.basis.block import AbstractBlock
 from idbench.identify.basis.friction.shape import ShapedFriction
 from idbench.identify.basis.joint_law import AbstractFriction
@@ -25,8 +25,6 @@ FOLDS = 10  # Stretches of the logs, each of which is predicted by a fit of the 
 FAST = 0.8
 """Speeds of a joint above this share of the rows are predicted once more, by a fit of the slower ones: a law that holds within
 the speeds of a fit alone fails there."""
-
-TINY = 1e-300  # Squares below this count as it
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +63,7 @@ class HeldOutProducts:
         speed = np.abs(np.array([joined[j, :, first + j] for j in range(basis.n)]))
         joined = np.concatenate([joined[..., :first], joined[..., -1:]], axis=-1)
         level = start.factors.squares(X)
-        weight = start.factors.rows / np.maximum(level, 1e-300)
+        weight = start.factors.rows / np.maximum(level, TINY)
         return cls(start, _held(joined, speed), weight, len(start.names), places)
 
     def in_sigmas(self, letters: str, j: int) -> float:

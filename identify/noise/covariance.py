@@ -116,11 +116,6 @@ class BandedCovariance:
         own = np.diagonal(self.bands[..., 0, :, :, :], axis1=-2, axis2=-1)
         return own.reshape(*own.shape[:-2], -1)
 
-    @property
-    def autocovariance(self) -> Array:
-        """Sum over instants of the covariance of rows of a kind with those some instants later, shape (..., kind, lag)."""
-        return np.swapaxes(np.diagonal(np.sum(self.bands, axis=-3), axis1=-2, axis2=-1), -1, -2)
-
     def of_sums(self, G: Array) -> Array:
         """Return G' C G, shape (..., m, m): the covariance of sums of rows with weights G, shape (..., r, m)."""
         lags, count, kinds = self.bands.shape[-4:-1]

@@ -80,11 +80,6 @@ class NormalEquations:
         return found
 
     @property
-    def border(self) -> Array:
-        """A_zX."""
-        return self.both[:, : len(self.corner)]
-
-    @property
     def b_nodes(self) -> Array:
         """The right-hand sides of the nodes."""
         return self.both[:, len(self.corner) :]
