@@ -2,12 +2,12 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
-from idbench.identify.arrays import HELD, Array, combined, frozen
+from idbench.identify.arrays import HELD, Array, combined
 from idbench.identify.basis.basis import Basis
 from idbench.identify.basis.newton_euler import momenta, torques
 from idbench.identify.signals.filters import between_samples, slide
@@ -135,7 +135,7 @@ def friction_jumps(basis: Basis, X: Array, q: Array) -> Array:
 def smoothed(x: Array, fs: float) -> Array:
     """Return `x`, shape (..., time), with noise above some 5 Hz taken out, and slow motion left as it is."""
     window = 2 * round(SMOOTHING * fs / 2) + 1
-    return slide(x, _parabola(window)) if window > 3 else x
+    return slide(x, parabola(window)) if window > 3 else x
 
 
 def _between(x: Array, places: Array, every: int) -> Array:
@@ -148,9 +148,3 @@ def _between(x: Array, places: Array, every: int) -> Array:
     weights = -s * (1 - s) ** 2 / 2, 1 - (5 - 3 * s) * s**2 / 2, s * (1 + (4 - 3 * s) * s) / 2, -(s**2) * (1 - s) / 2
     total: Array = sum(w * ends[..., first + i] for i, w in enumerate(weights))
     return total
-
-
-@lru_cache(maxsize=16)
-def _parabola(window: int) -> Array:
-    """Weights of the samples at the middle of their least-squares parabola (Savitzky and Golay)."""
-    return frozen(parabola(window))

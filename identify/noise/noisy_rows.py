@@ -57,12 +57,8 @@ class NoisyRows:
     @property
     def unmasked(self) -> "NoisyRows":
         """The rows as if nothing were masked."""
-        return self._whole or self
-
-    @cached_property
-    def _whole(self) -> "NoisyRows | None":
         to_rows = self.to_rows.unmasked()
-        return None if to_rows is self.to_rows else NoisyRows(to_rows, self.linear)
+        return self if to_rows is self.to_rows else NoisyRows(to_rows, self.linear)
 
     def whitening(self, levels: NoiseLevels) -> Whitening:
         """Whitening of the kept rows by noise of these levels; of `units` where they are there."""
