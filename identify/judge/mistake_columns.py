@@ -31,11 +31,7 @@ Signal: TypeAlias = Callable[[FittedMotion, int], Array]
 
 def of_joint(f: Signal) -> Columns:
     """Return columns that stand in the row of the joint alone."""
-
-    def columns(m: FittedMotion, j: int) -> Rows:
-        return {j: f(m, j)}
-
-    return columns
+    return lambda m, j: {j: f(m, j)}
 
 
 def whole_rows(x: Array | None) -> Rows:
@@ -89,9 +85,9 @@ def elasticity(m: FittedMotion, j: int) -> Rows:
     return whole_rows(-m.moved(j, m.load[j], first[j], second[j]))
 
 
-def cogging(waves: int) -> Columns:
+def cogging(m: FittedMotion, j: int, waves: int) -> tuple[Rows, ...]:
     """Return columns of a ripple of so many waves a turn."""
-    return lambda m, j: ({j: np.sin(waves * m.state.q[j])}, {j: np.cos(waves * m.state.q[j])})
+    return {j: np.sin(waves * m.state.q[j])}, {j: np.cos(waves * m.state.q[j])}
 
 
 def presliding(m: FittedMotion, j: int, share: float) -> Array:
@@ -130,18 +126,15 @@ def tilt(m: FittedMotion, j: int) -> tuple[Rows, ...]:
     return (*turned, {0: np.sin(q)}, {0: np.cos(q)})
 
 
-def link_length(axis: int) -> Columns:
+def link_length(m: FittedMotion, j: int, axis: int) -> Rows:
     """Return columns of an origin that is farther along an axis."""
 
-    def column(m: FittedMotion, j: int) -> Rows:
-        def longer(tree: KinematicTree) -> KinematicTree:
-            joint = tree.joints[j]
-            moved = replace(joint, position=joint.position + SMALL * np.eye(3)[axis])
-            return replace(tree, joints=(*tree.joints[:j], moved, *tree.joints[j + 1 :]))
+    def longer(tree: KinematicTree) -> KinematicTree:
+        joint = tree.joints[j]
+        moved = replace(joint, position=joint.position + SMALL * np.eye(3)[axis])
+        return replace(tree, joints=(*tree.joints[:j], moved, *tree.joints[j + 1 :]))
 
-        return whole_rows(m.on(longer)) if j else {}
-
-    return column
+    return whole_rows(m.on(longer)) if j else {}
 
 
 def link_axis(m: FittedMotion, j: int) -> tuple[Rows, ...]:
@@ -166,14 +159,10 @@ def rotation(v: Array) -> Array:
     return np.asarray(np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * K @ K)
 
 
-def fading(share: float) -> Signal:
+def fading(m: FittedMotion, j: int, share: float) -> Array:
     """Additional friction near rest, up to a share of the joint's rms speed."""
-
-    def signal(m: FittedMotion, j: int) -> Array:
-        qd = m.state.qd[j]
-        return np.asarray(np.sign(qd) * np.exp(-((qd / max(share * rms(qd), 1e-12)) ** 2)))
-
-    return signal
+    qd = m.state.qd[j]
+    return np.asarray(np.sign(qd) * np.exp(-((qd / max(share * rms(qd), 1e-12)) ** 2)))
 
 
 def rms(x: Array) -> float:
@@ -215,14 +204,10 @@ def late(m: FittedMotion, j: int) -> Array:
     return -m.rate(m.torque[j])
 
 
-def pushed(axis: int) -> Columns:
+def pushed(m: FittedMotion, j: int, axis: int) -> Rows:
     """Torques per acceleration of the base along an axis."""
-
-    def column(m: FittedMotion, j: int) -> Rows:
-        del j
-        return whole_rows(m.on(lambda tree: replace(tree, gravity=tree.gravity - SMALL * np.eye(3)[axis])))
-
-    return column
+    del j
+    return whole_rows(m.on(lambda tree: replace(tree, gravity=tree.gravity - SMALL * np.eye(3)[axis])))
 
 
 def payload(m: FittedMotion, j: int) -> tuple[Rows, ...]:

@@ -3,6 +3,7 @@
 A column is the derivative of logged - predicted torque by the size of a mistake, at a fit; each shape of one has its line.
 """
 
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -77,16 +78,16 @@ OF_JOINTS: tuple[Mistake, ...] = (
     Mistake("coupled_rotor", coupled, "kg m^2", "drive"),
     Mistake("spring", of_joint(lambda m, j: m.state.q[j]), "N m/rad", "drive"),
     Mistake("load", of_joint(lambda m, j: np.abs(m.load[j]) * np.sign(m.state.qd[j])), "1", "friction", positive=True),
-    *(Mistake("velocity", of_joint(fading(share)), "N m", "friction") for share in CREEP),
+    *(Mistake("velocity", of_joint(partial(fading, share=share)), "N m", "friction") for share in CREEP),
     Mistake("velocity", of_joint(lambda m, j: m.state.qd[j] * np.abs(m.state.qd[j])), "N m s^2/rad^2", "friction"),
     Mistake("asymmetry", of_joint(lambda m, j: np.abs(m.state.qd[j])), "N m s/rad", "friction"),
     Mistake("warming", of_joint(lambda m, j: (m.t - m.t[0]) * m.state.qd[j]), "N m/rad", "friction"),
     Mistake("warming", of_joint(lambda m, j: (m.t - m.t[0]) * np.sign(m.state.qd[j])), "N m/s", "friction"),
     *(Mistake("hysteresis", of_joint(turning(share)), "N m", "friction", positive=True) for share in PRESLIDING),
-    *(Mistake("cogging", cogging(k), "N m", "drive", k) for k in TURNS),
+    *(Mistake("cogging", partial(cogging, waves=k), "N m", "drive", k) for k in TURNS),
     Mistake("backlash", backlash, "rad", "drive", positive=True),
     Mistake("elasticity", elasticity, "rad/(N m)", "drive", positive=True),
-    *(Mistake("length", link_length(axis), "m", "link", axis, most=LONG) for axis in range(3)),
+    *(Mistake("length", partial(link_length, axis=axis), "m", "link", axis, most=LONG) for axis in range(3)),
     Mistake("axis", link_axis, "rad", "link", most=0.5),
 )
 """Mistakes of a joint."""
@@ -96,7 +97,7 @@ OF_ROBOT: tuple[Mistake, ...] = (
     Mistake("delay", lambda m, _: whole_rows(-m.rate(m.torque)), "s"),
     Mistake("warming", lambda m, _: whole_rows((m.t - m.t[0]) * (m.torque - m.load)), "1/s", "friction"),
     Mistake("load", of_every(lambda m, j: np.abs(m.load[j]) * np.sign(m.state.qd[j])), "1", "friction", positive=True),
-    *(Mistake("velocity", of_every(fading(share), friction), "1", "friction") for share in CREEP),
+    *(Mistake("velocity", of_every(partial(fading, share=share), friction), "1", "friction") for share in CREEP),
     Mistake("velocity", of_every(lambda m, j: m.state.qd[j] * np.abs(m.state.qd[j]), drag), "1", "friction"),
     Mistake("asymmetry", asymmetric, "1", "friction"),
     *(Mistake("hysteresis", of_every(turning(share), friction), "1", "friction", positive=True) for share in PRESLIDING),
@@ -112,5 +113,5 @@ FROM_AN_INSTANT: tuple[Mistake, ...] = (Mistake("payload", payload, "kg", "link"
 COLLISION = Mistake("collision", of_joint(lambda m, _: np.ones_like(m.t)), "N m")
 """A torque that acts for a moment, where residuals are largest."""
 
-BASE: tuple[Mistake, ...] = tuple(Mistake("base_motion", pushed(axis), "m/s^2", "base") for axis in range(3))
+BASE: tuple[Mistake, ...] = tuple(Mistake("base_motion", partial(pushed, axis=axis), "m/s^2", "base") for axis in range(3))
 """Motion of the base, at the frequencies that residuals have."""
