@@ -138,7 +138,10 @@ def attempt_each(
     found = dict[str, Estimate | IdentificationError]()
     for number, (name, each) in enumerate(problems.items(), 1):
         with stage(f"{name} model, {estimator.called} ({number} of {len(problems)})"):
-            found[name] = _outcome(each, estimator, throw)
+            try:
+                found[name] = estimate(each, estimator, throw=throw)
+            except IdentificationError as error:
+                found[name] = error
     problem.forget()
     return found
 
@@ -161,13 +164,6 @@ def estimate(problem: Problem, estimator: AbstractEstimator, *, throw: bool = Tr
         if throw and estimator.full_rank and not problem.long:  # of long logs it is reported as they are solved
             problem.factors.together.check()
         return estimator.fit(problem, throw=throw)
-
-
-def _outcome(problem: Problem, estimator: AbstractEstimator, throw: bool) -> Estimate | IdentificationError:
-    try:
-        return estimate(problem, estimator, throw=throw)
-    except IdentificationError as error:
-        return error
 
 
 def _problem(
