@@ -70,11 +70,6 @@ class Paths:
         """Return the variances that noise of these standard deviations, shape (..., joint), gives the rows, shape (..., r)."""
         return BandedCovariance.of(self.grid, self.windows, self._leveled(level), self.outside, 1).variance
 
-    def by_kind(self) -> "Paths":
-        """Return the paths to the rows of each kind by itself, the kind being the last of the leading axes."""
-        alone = [signal[..., None, :, :] for signal in self.signals]
-        return Paths(self.grid, self.windows, alone, self.outside[..., None, :])
-
     def each(self) -> Iterator[BandedCovariance]:
         """Yield the covariances that unit noise gives the rows, joint by joint."""
         for j in range(self.signals[0].shape[-2]):

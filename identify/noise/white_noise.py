@@ -93,8 +93,9 @@ def torque_noise(logs: Sequence[Signals], residual: Array) -> Array:
 
 def residual_level(parts: Sequence[Rows], noisy: Sequence[NoisyRows], factors: Factors, X: Array) -> Array:
     """Return the noise of torques that has the squares of the residuals, shape (..., joint) [N m], or NaN."""
-    one = np.ones((1, parts[0].kinds))
-    squares = sum(np.sum(each.torque.by_kind().variance(one), axis=-1) for each in noisy)
+    one = np.ones(parts[0].kinds)
+    variances = (rows.by_kind(each.torque.variance(one)) for rows, each in zip(parts, noisy, strict=True))
+    squares = sum(np.sum(np.ascontiguousarray(variance), axis=-1) for variance in variances)
     return np.sqrt(np.divide(factors.squares(X), squares, out=np.full(factors.rows.shape, np.nan), where=squares > 0))
 
 
