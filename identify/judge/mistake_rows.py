@@ -1,6 +1,6 @@
 """The rows that mistakes would leave unexplained: columns through mask and operator, as those of parameters."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -170,7 +170,11 @@ class MistakeRows:
         """Return the fitted motion of a log at some of its samples, one of how many."""
         cutoff = getattr(part.problem.own_chain.operator, "cutoff", None) or USUAL
         thin = max(1, int(part.signals.fs / (RATE * cutoff)))
-        return _thinned(part, self.basis, self.X, thin), thin
+        state = part.signals.state
+        q, qd, qdd = (np.ascontiguousarray(x[..., ::thin]) for x in (state.q, state.qd, state.qdd))
+        conditions = {name: x[..., ::thin] for name, x in state.conditions.items()}
+        t = np.arange(q.shape[-1]) * thin / part.signals.fs
+        return FittedMotion(self.basis, self.X, State(q, qd, lambda _: qdd, conditions), t, part.signals.log.poses), thin
 
     def _of_part(self, part: LogRows, asked: Iterable[tuple[Mistake, int | None]]) -> list[list[Array]]:
         """Return the rows of each column of mistakes."""
@@ -184,23 +188,6 @@ def held_torque(part: LogRows) -> Array:
     """Return the rows of the torque of parameters that are held, and of laws about their shapes: measured ones less Y."""
     to_rows = part.rows.maps[0]
     return np.asarray(to_rows.measurement(to_rows.signals.torque.mean) - part.rows.Y)
-
-
-def _thinned(part: LogRows, basis: Basis, X: Array, thin: int) -> FittedMotion:
-    state = part.signals.state
-    q, qd, qdd = (np.ascontiguousarray(x[..., ::thin]) for x in (state.q, state.qd, state.qdd))
-    conditions = {name: x[..., ::thin] for name, x in state.conditions.items()}
-    return FittedMotion(
-        basis,
-        X,
-        _state(q, qd, qdd, conditions),
-        np.arange(q.shape[-1]) * thin / part.signals.fs,
-        part.signals.log.poses,
-    )
-
-
-def _state(q: Array, qd: Array, qdd: Array, conditions: Mapping[str, Array]) -> State:
-    return State(q, qd, lambda _: qdd, conditions)
 
 
 def _filtered(part: LogRows, columns: Sequence[Rows], t: Array, thin: int) -> Iterator[Array]:
