@@ -148,6 +148,11 @@ class LogRows:
         return friction_bias(noisy.to_rows, self.linear, self.problem.model, self.problem.noise.position)
 
 
+def split_by_log(x: Array, parts: Sequence[LogRows], axis: int = 0) -> list[Array]:
+    """Values of the rows of all parts, one after the other along an axis, part by part."""
+    return np.split(x, np.cumsum([len(part.rows.time) for part in parts])[:-1], axis)
+
+
 def noise_covariance(problem: "Problem", influence: Sequence[Array]) -> Array:
     """Return the covariance that the noise of a problem's logs gives an estimate X = G' Y, shape (..., p, p).
 

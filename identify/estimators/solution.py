@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from idbench.identify.arrays import Array
-from idbench.identify.estimators.log_rows import LogRows
+from idbench.identify.estimators.log_rows import LogRows, split_by_log
 
 
 class AbstractSolution(ABC):
@@ -98,19 +98,14 @@ class Given(AbstractSolution):
 
     def influence(self, parts: Sequence[LogRows]) -> list[Array]:
         """Return G as it was given."""
-        return np.split(self.G, _ends(parts), axis=-2)
+        return split_by_log(self.G, parts, -2)
 
     def independent(self, parts: Sequence[LogRows]) -> list[Array] | None:
         """Return the weighted rows."""
         if self.weight is None:
             return None
-        weights = np.split(self.weight, _ends(parts), axis=-1)
+        weights = split_by_log(self.weight, parts, -1)
         return [part.rows.joined * weight[..., None] for part, weight in zip(parts, weights, strict=True)]
-
-
-def _ends(parts: Sequence[LogRows]) -> Array:
-    """Ends of the rows of each part but the last."""
-    return np.cumsum([len(part.rows.time) for part in parts])[:-1]
 
 
 def _of_prior(known: Array | None, inverse: Array) -> Array:

@@ -8,7 +8,7 @@ import numpy as np
 
 from idbench.identify.arrays import Array
 from idbench.identify.basis.basis import Basis
-from idbench.identify.estimators.log_rows import LogRows
+from idbench.identify.estimators.log_rows import LogRows, split_by_log
 from idbench.identify.judge.fitted_motion import FittedMotion
 from idbench.identify.judge.mistake_columns import Rows
 from idbench.identify.judge.mistakes import (
@@ -155,8 +155,7 @@ class MistakeRows:
             yield self._candidate(c.mistake, c.joint, c.plain * (time > instant)[:, None], float(instant))
 
     def _candidate(self, mistake: Mistake, joint: int | None, plain: Array, instant: float | None = None) -> Candidate:
-        ends = np.cumsum([len(part.rows.time) for part in self.parts])[:-1]
-        each = zip(self.parts, np.split(plain, ends), strict=True)
+        each = zip(self.parts, split_by_log(plain, self.parts), strict=True)
         return Candidate(mistake, joint, plain, np.concatenate([part.whitening.whiten(x) for part, x in each]), instant)
 
     def _made(self, asked: Sequence[tuple[Mistake, int | None]]) -> Iterator[Candidate]:

@@ -9,6 +9,7 @@ import scipy
 
 from idbench.identify.arrays import TINY, Array
 from idbench.identify.errors import IdentificationError
+from idbench.identify.estimators.log_rows import split_by_log
 from idbench.identify.estimators.problem import Problem
 from idbench.identify.judge.delay_step import torque_lateness
 from idbench.identify.judge.mistake_rows import Candidate, MistakeRows, held_torque
@@ -177,7 +178,8 @@ class _Search:
         gain, rest = self._gain(e[:own], U[:own], b), e - U @ b
         if not of_all and not self._may_matter(e[:own], b):
             return _Tested(candidate, U[:own], np.zeros(0), np.zeros(0), U[:own] @ b, 0.0, gain, of_all)
-        each = zip(self.problem.parts, self._split(U[:own]), self._split(rest[:own]), strict=True)
+        parts = self.problem.parts
+        each = zip(parts, split_by_log(U[:own], parts), split_by_log(rest[:own], parts), strict=True)
         V = sum((scatter_of_sums(part, x, r) for part, x, r in each), start=np.zeros(()))
         chi2 = float(b @ np.linalg.solve(V, b))
         sizes, sigma = np.zeros((2, len(size)))
@@ -211,11 +213,8 @@ class _Search:
 
     def _white(self, x: Array) -> Array:
         """Whitened rows, with zeros for the prior."""
-        each = zip(self.problem.parts, self._split(x), strict=True)
+        each = zip(self.problem.parts, split_by_log(x, self.problem.parts), strict=True)
         return np.concatenate([*(part.whitening.whiten(y[:, None])[:, 0] for part, y in each), np.zeros(self._known)])
-
-    def _split(self, x: Array) -> list[Array]:
-        return np.split(x, np.cumsum([len(part.rows.time) for part in self.problem.parts])[:-1])
 
     def _unlikely(self, e: Array) -> float:
         """Return minus twice the logarithm of the likelihood, with a level of each kind."""

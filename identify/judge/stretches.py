@@ -4,7 +4,7 @@ import numpy as np
 
 from idbench.identify.arrays import TINY, Array
 from idbench.identify.estimators.leave_out import Stretches, left_out
-from idbench.identify.estimators.log_rows import LogRows
+from idbench.identify.estimators.log_rows import LogRows, split_by_log
 from idbench.identify.estimators.problem import Problem
 from idbench.identify.rows.factors import CONVERGED
 
@@ -26,8 +26,7 @@ def errors_of_stretches(problem: Problem, white: Array, Y: Array, plain: Array) 
     rows, own = problem.rows, len(plain)
     parts, stretches = problem.parts, Stretches.of(problem.parts)
     joined = np.column_stack([white, Y])
-    ends = np.cumsum([len(part.rows.time) for part in parts])
-    X = left_out(stretches.products(parts, np.split(joined[:own], ends[:-1])), joined[own:])
+    X = left_out(stretches.products(parts, split_by_log(joined[:own], parts)), joined[own:])
     stretch = np.concatenate([stretches.at(k, part.rows.time) for k, part in enumerate(parts)])
     errors = rows.Y - np.sum(plain * X[stretch], axis=-1)
     squares, of_all = (np.sum(rows.by_kind(x * rows.valid) ** 2, axis=-1) for x in (errors, rows.Y))
