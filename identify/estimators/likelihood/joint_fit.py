@@ -109,7 +109,7 @@ class JointFit:
         if moved > RESTLESS:
             raise IdentificationError(f"motion and parameters together do not converge: steps of {moved:.2g} sigma: {CHECK}")
         same = np.allclose(now.levels.torque, before.torque, rtol=LIKE)
-        return now if same else replace(now, covariance=now._reduced(now._noises())[2])
+        return now if same else replace(now, covariance=now._reduced(now._noises())[1])
 
     def with_reversals(self) -> "JointFit":
         """Return this fit as the start of one that uses friction through reversals."""
@@ -127,7 +127,7 @@ class JointFit:
         rng, n = np.random.default_rng(0), self.basis.n
         probes = int(np.clip(PROBES / sum(cells.count for cells in self.logs), 1, MOST_PROBES))
         signs = [rng.choice([-1.0, 1.0], (probes, n, cells.count)) for cells in self.logs]
-        _, parts, covariance, b = self._reduced(noises, signs)
+        parts, covariance, b = self._reduced(noises, signs)
         taken = sum(np.sum(y[:, 1:] ** 2, axis=0) for _, y, _ in parts) + np.sum(b[:, 1:] * (covariance @ b[:, 1:]), axis=0)
         dX = covariance @ b[:, 0]
         motions = []
@@ -198,25 +198,18 @@ class JointFit:
         torque, near = (np.maximum(x * y, floor) for x, y in zip((self.levels.torque, self._near), factor, strict=True))
         return replace(self, levels=replace(self.levels, torque=torque), near=None if self.near is None else near)
 
-    def _reduced(
-        self, noises: list[Noise], signs: Sequence[Array | None] | None = None
-    ) -> tuple[list[NormalEquations], list[Solved], Array, Array]:
-        """Return equations, their solutions, and the covariance of the unknowns and their right-hand sides without motions."""
+    def _reduced(self, noises: list[Noise], signs: Sequence[Array | None] | None = None) -> tuple[list[Solved], Array, Array]:
+        """Return solutions, and the covariance of the unknowns and their right-hand sides with the motions eliminated."""
         each = signs or [None] * len(self.logs)
         systems = [
             NormalEquations.of(cells, self.basis, self.X, z, noise, some)
             for cells, z, noise, some in zip(self.logs, self.motions, noises, each, strict=True)
         ]
-        parts = [system.solved() for system in systems]
-        return systems, parts, *_without_motions(systems, parts, len(self.unknowns))
-
-
-def _without_motions(systems: list[NormalEquations], parts: list[Solved], count: int) -> tuple[Array, Array]:
-    """Return the covariance of the first `count` parameters, and their right-hand sides, with the motions eliminated."""
-    S = np.asarray(sum(system.corner - V.T @ V for system, (V, _, _) in zip(systems, parts, strict=True)))[:count, :count]
-    b = np.asarray(sum(system.b_parameters - V.T @ y for system, (V, y, _) in zip(systems, parts, strict=True)))[:count]
-    size = np.sqrt(np.maximum(np.diag(S), 1e-300))
-    return np.linalg.pinv(S / np.outer(size, size), hermitian=True) / np.outer(size, size), b
+        parts, count = [system.solved() for system in systems], len(self.unknowns)
+        S = np.asarray(sum(system.corner - V.T @ V for system, (V, _, _) in zip(systems, parts, strict=True)))[:count, :count]
+        b = np.asarray(sum(system.b_parameters - V.T @ y for system, (V, y, _) in zip(systems, parts, strict=True)))[:count]
+        size = np.sqrt(np.maximum(np.diag(S), 1e-300))
+        return parts, np.linalg.pinv(S / np.outer(size, size), hermitian=True) / np.outer(size, size), b
 
 
 def _sigmas(dX: Array, covariance: Array) -> float:
