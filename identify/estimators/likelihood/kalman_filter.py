@@ -1,5 +1,6 @@
 """Unscented Kalman filter of states and parameters."""
 
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -81,7 +82,10 @@ class UnscentedKalmanFilter(AbstractEstimator):
             if problem.factors.together.status[run] != Status.OK or not np.isfinite(start[run]).all():
                 continue
             own = NoiseLevels(np.maximum(np.nan_to_num(levels.torque[run]), MIN_NOISE), problem.position_noise[run])
-            found = [way for tuning in TUNINGS if (way := _tried(problem, run, (start[run], sigma[run]), own, tuning))]
+            found = []
+            for tuning in TUNINGS:
+                with suppress(np.linalg.LinAlgError):  # it diverges
+                    found.append(_filtered(problem, run, start[run], sigma[run], own, tuning))
             if not found:
                 failures[run] = "the filter diverges from this start: start closer to the true parameters, or with less spread"
                 continue
@@ -92,16 +96,6 @@ class UnscentedKalmanFilter(AbstractEstimator):
         calibrated = frozen(covariance)
         noise = NoiseLevels(torque, problem.position_noise)
         return Estimate(problem, frozen(X), calibrated, calibrated=calibrated, levels=noise, failures=failures, path=(start, X))
-
-
-def _tried(
-    problem: Problem, run: tuple[int, ...], begin: tuple[Array, Array], noise: NoiseLevels, tuning: float
-) -> tuple[float, Array, Array, Array] | None:
-    """Result of `_filtered`; None if it diverges."""
-    try:
-        return _filtered(problem, run, *begin, noise, tuning)
-    except np.linalg.LinAlgError:
-        return None
 
 
 def _filtered(
@@ -141,7 +135,8 @@ class _Filter:
         n, p = q.shape[-1], len(X)
         z = np.concatenate([q[0], np.zeros(n), X / sigma])
         P = np.zeros((2 * n + p, 2 * n + p))
-        P[:n, :n], P[n : 2 * n, n : 2 * n] = np.diag(self.position**2), np.diag(self._first_velocity(q) ** 2)
+        velocity = np.minimum(np.abs(q[1] - q[0]) * self.fs + 10 * self.position * self.fs, FASTEST)
+        P[:n, :n], P[n : 2 * n, n : 2 * n] = np.diag(self.position**2), np.diag(velocity**2)
         P[2 * n :, 2 * n :] = P_X
         likelihood, R = 0.0, np.diag(self.position**2)
         for k in range(len(q)):
@@ -158,9 +153,6 @@ class _Filter:
         if not np.isfinite(z).all():
             raise np.linalg.LinAlgError("not finite")
         return likelihood, z[2 * n :] * sigma, P[2 * n :, 2 * n :]
-
-    def _first_velocity(self, q: Array) -> Array:
-        return np.minimum(np.abs(q[1] - q[0]) * self.fs + 10 * self.position * self.fs, FASTEST)
 
     def _moved(self, k: int, z: Array, P: Array, sigma: Array) -> tuple[Array, Array]:
         """Return state and covariance a sample later."""
