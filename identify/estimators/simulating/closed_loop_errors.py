@@ -1,7 +1,7 @@
 """Closed-loop output error (CLOE)."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -49,38 +49,26 @@ def gauss_newton(problem: Problem, rounds: Rounds, output: Output, kinds: Kinds)
     W = problem.at(rounds.simulated(X).logs).W
     X = solve_with(Kinds.of_rows(problem), problem.rows.Y, W, W).X
     rounds.path.append(X)
-    line, p = _Line(), X.shape[-1]
+    p = X.shape[-1]
     unit = np.eye(p).reshape(p, *[1] * (X.ndim - 1), p)
+    best, least = X, np.full(X.shape[:-1], np.inf)  # parameters of the least residuals so far, run by run, and these
 
     def step(X: Array) -> Solved:
+        nonlocal best, least
         every = np.concatenate([X[None], X + h * unit])
         made = output(rounds.simulated(every).logs)
         J = np.moveaxis(made[1:] - made[0], 0, -1) / h[..., None, :]
-        return line.shortened(solve_with(kinds, measured - made[0], J, J).moved(X), X, measured - made[0], kinds)
-
-    return rounds.until_settled(step, X)
-
-
-class _Line:
-    """The parameters of the least residuals so far, run by run."""
-
-    def __init__(self) -> None:
-        self._best: Array | None = None
-        self._least: Array = np.empty(0)
-
-    def shortened(self, found: Solved, X: Array, residual: Array, kinds: Kinds) -> Solved:
-        """Return a step as it is, or, if it began where residuals are larger than they were, half the way back."""
+        residual = measured - made[0]
+        found = solve_with(kinds, residual, J, J)
         size = np.sqrt(np.mean(kinds.by_kind(residual * kinds.own) ** 2, axis=-2))
         size = np.nan_to_num(np.exp(np.mean(np.log(np.maximum(size, 1e-300)), axis=-1)), nan=np.inf)
-        if self._best is None:
-            self._best, self._least = X, size
-            return found
-        worse = size > WORSE * self._least
-        back = Solved((X + self._best) / 2, found.G, found.residual, found.covariance)
-        better = size < self._least
-        self._best = np.where(better[..., None], X, self._best)
-        self._least = np.where(better, size, self._least)
-        return back.where(worse, found)
+        # Half the way back from where residuals are larger than they were.
+        ahead = np.where((size > WORSE * least)[..., None], (X + best) / 2, X + found.X)
+        better = size < least
+        best, least = np.where(better[..., None], X, best), np.where(better, size, least)
+        return replace(found, X=ahead)
+
+    return rounds.until_settled(step, X)
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
 """Least squares of rows with instruments, every run by itself."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Self
 
 import numpy as np
@@ -63,14 +63,8 @@ class Solved:
         """Return the covariance of X if residuals times these weights, shape (..., r), are independent and alike."""
         return _covariance(self.G, self.residual, weight)
 
-    def moved(self, X: Array) -> Self:
-        """Return the solution of which X is the step from somewhere."""
-        return replace(self, X=X + self.X)
-
-    def where(self, active: npt.NDArray[np.bool_], before: "Solved | None") -> "Solved":
+    def where(self, active: npt.NDArray[np.bool_], before: "Solved") -> "Solved":
         """Return this solution in the runs that are active, and that before in the others."""
-        if before is None:
-            return self
         pairs = [(getattr(self, x), getattr(before, x)) for x in ("X", "G", "residual", "covariance")]
         return Solved(*(np.where(active.reshape(*active.shape, *[1] * (a.ndim - active.ndim)), a, b) for a, b in pairs))
 

@@ -60,8 +60,7 @@ class Rounds:
     def start(self) -> Array:
         """Initial parameters, shape (..., p)."""
         X = starting_point(self.problem)
-        for run in map(tuple, np.argwhere(~np.isfinite(X).all(axis=-1)).tolist()):
-            self.fail(run, "its rows do not determine the parameters")
+        self._require_finite(X, "its rows do not determine the parameters")
         self.path.append(X)
         return X
 
@@ -92,7 +91,7 @@ class Rounds:
             with stage(f"round {number} of at most {self.most}"):
                 new = step(X)
             self._require_finite(new.X, "the simulated motion does not determine the parameters")
-            found = new.where(self.active, found)
+            found = new.where(self.active, found) if found else new
             unit = np.maximum(new.sigma, NOTHING * self._small)
             with np.errstate(invalid="ignore", divide="ignore"):
                 move = np.where(self.active[..., None], np.abs(new.X - X) / unit, move)
