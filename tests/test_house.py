@@ -16,7 +16,7 @@ SAME_NAME = {
 
 LINES = 56_100
 
-BASES = {"Plant", "Table", "Steps", "Command", "WrittenOptions", "RecordedOptions", "LogRequest", "LoadRequest"}
+BASES = {"Plant", "Table", "Command", "WrittenOptions", "RecordedOptions", "LogRequest", "LoadRequest"}
 """Classes that are used as they are, and inherited from."""
 
 

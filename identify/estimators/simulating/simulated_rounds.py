@@ -14,7 +14,7 @@ from idbench.identify.estimators.estimate import Estimate
 from idbench.identify.estimators.estimator import AbstractEstimator
 from idbench.identify.estimators.problem import Problem
 from idbench.identify.estimators.simulating.row_products import Solved
-from idbench.identify.estimators.simulating.steps import Steps
+from idbench.identify.estimators.simulating.steps import SecantSteps, largest
 from idbench.identify.estimators.simulator import AbstractLoop, Simulated
 from idbench.identify.estimators.solution import AbstractSolution
 from idbench.identify.models import ExplicitModel
@@ -64,7 +64,7 @@ class Rounds:
         self.path.append(X)
         return X
 
-    def until_settled(self, step: Callable[[Array], Solved], X: Array, steps: Steps | None = None) -> Solved:
+    def until_settled(self, step: Callable[[Array], Solved], X: Array, steps: SecantSteps | None = None) -> Solved:
         """Return the solution of `step` that does not move any more; runs that have converged are left as they are.
 
         A round whose controller was made for the simulated robot is not the last: the real one was not.
@@ -75,7 +75,7 @@ class Rounds:
             Makes a round from parameters, shape (..., p).
         X : Array, shape (..., p)
             Where it begins.
-        steps : Steps, optional
+        steps : SecantSteps, optional
             Remaining distance and start of the next step; by default the move and the end of the last one.
 
         Raises
@@ -84,7 +84,6 @@ class Rounds:
             If every run fails; the reason of the first.
         """
         found: Solved | None = None
-        steps = steps or Steps()
         move = np.full(X.shape, np.inf)
         left = np.full(X.shape[:-1], np.inf)
         for number in range(1, self.most + 1):
@@ -95,7 +94,10 @@ class Rounds:
             unit = np.maximum(new.sigma, NOTHING * self._small)
             with np.errstate(invalid="ignore", divide="ignore"):
                 move = np.where(self.active[..., None], np.abs(new.X - X) / unit, move)
-                now, after = steps.taken(X, new.X, unit, comparable=not self._informed)
+                if steps and not self._informed:
+                    now, after = steps.taken(X, new.X, unit)
+                else:  # steps that converge faster than can be extrapolated, or a first round that was another one
+                    now, after = largest((new.X - X) / unit), new.X
             left = np.where(self.active, np.inf if self._informed else now, left)
             self.path.append(found.X)
             self.active &= ~(left < self.settled)
