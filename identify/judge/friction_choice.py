@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from idbench.identify.arrays import TINY, Array, combined
+from idbench.identify.arrays import combined
 from idbench.identify.basis.basis import Basis
 from idbench.identify.basis.block import FRICTION, AbstractBlock
 from idbench.identify.basis.friction.laws import TanhFriction
@@ -14,107 +14,9 @@ from idbench.identify.basis.friction.shape import ShapedFriction
 from idbench.identify.basis.of_joints import OfJoints
 from idbench.identify.estimators.problem import Problem
 from idbench.identify.estimators.settle import settled
-from idbench.identify.judge.held_out import FOLDS, HeldOutProducts, sigma_squares, solved, squares
+from idbench.identify.judge.held_out import HeldOutProducts, LawScore, gain
 from idbench.identify.signals.masks import NoMask
 from idbench.identify.signals.signals import State
-
-EXCUSED = 2.0
-"""Squares at speeds above those of a fit that sigma makes, in multiples of what it makes on average, are no fault of a law."""
-
-
-@dataclass(frozen=True)
-class LawScore:
-    """What a law changes on motion that was not fitted."""
-
-    joint: int
-    """From 0."""
-    law: str
-    """Its name."""
-    share: float
-    """Of the joint's squared error, how much it takes; negative if it adds to it."""
-    deviations: float
-    """What it takes of the logarithm of the squared errors of the stretches, on average, in standard deviations of that."""
-    sigmas: float
-    """How many sigma its parameter is away from zero, with independent rows."""
-    least: float
-    """Share that it takes without the stretch in which it takes most."""
-    beyond: float
-    """Share that it takes of the squared error at speeds above those of a fit; NaN where that is not asked, as `sigmas`."""
-    taken: bool
-    """Whether the joint has it in the end."""
-
-
-def gain(before: Array, after: Array) -> tuple[float, float, float]:
-    """Return the share of squared errors that is taken, how many deviations that is from none, and `LawScore.least`."""
-    ratio = np.log(np.maximum(before, TINY) / np.maximum(after, TINY))
-    spread = float(np.std(ratio, ddof=1) / np.sqrt(FOLDS))
-    others = np.delete(np.arange(FOLDS), np.argmax(before - after))
-    share, least = (float(1 - after[k].sum() / max(before[k].sum(), TINY)) for k in (np.arange(FOLDS), others))
-    return share, float(ratio.mean() / spread) if spread > 0 else 0.0, least
-
-
-@dataclass(frozen=True, eq=False)
-class LawSearch:
-    """Laws that are compared beside those of a problem, joint by joint."""
-
-    products: HeldOutProducts
-    """Of the rows, stretch by stretch."""
-
-    @property
-    def places(self) -> list[tuple[int, str]]:
-        """Joints and laws that are compared."""
-        return [(j, name) for name, j in self.products.places]
-
-    def score(self, j: int, name: str) -> LawScore:
-        """Gain of a law at a joint."""
-        (before, left_open), (after, more_open) = self._errors(j, None), self._errors(j, name)
-        if not np.isfinite(after).all():  # nothing that could be solved
-            return LawScore(j, name, -np.inf, -np.inf, 0.0, -np.inf, -np.inf, taken=False)
-        share, deviations, least = gain(before[:-1], after[:-1])
-        # What the noise of the fit makes farther out is no fault of the law.
-        beyond = 1 - (after[-1] - EXCUSED * (more_open[-1] - left_open[-1])) / max(before[-1], TINY)
-        return LawScore(j, name, share, deviations, self.products.sigmas(name, j), least, float(beyond), taken=False)
-
-    @property
-    def errors(self) -> Array:
-        """Squared error of each joint on stretches that were not fitted, without further laws, shape (joint,)."""
-        return np.array([self.squares(j).sum() for j in range(self.products.start.basis.n)])
-
-    def squares(self, j: int) -> Array:
-        """Return squared errors of a joint on stretches that were not fitted, without further laws, shape (FOLDS,)."""
-        return self._errors(j, None)[0][:-1]
-
-    def _errors(self, j: int, law: str | None) -> Array:
-        """Return squared errors of a joint in every stretch and in the fastest motion, and what sigma makes, (2, FOLDS + 1)."""
-        key = law, j
-        if key not in self._known:
-            self._known[key] = np.array([self._predicted(j, law, k) for k in range(FOLDS + 1)]).T
-        return self._known[key]
-
-    @cached_property
-    def _known(self) -> dict[tuple[str | None, int], Array]:
-        return {}
-
-    def _predicted(self, j: int, law: str | None, fold: int) -> tuple[float, float]:
-        """Return the squared error of a joint in a stretch, by a fit of the rest, and what sigma makes of it in fast motion.
-
-        Shapes are those that fit the rest best.
-        """
-        products = self.products
-        judged, fitted = products.held[fold][j], products.fitted(fold, j)
-        least = np.inf
-        best = np.inf
-        spread = 0.0
-        # The fastest motion has had no say in the shapes: they are those that fit the slower best.
-        every = [[]] if law is None else products.places[law, j] if fold == FOLDS else products.likely(law, j)
-        for own in every:
-            columns = [*range(products.p), *own]
-            X = solved(fitted, columns)
-            if (misfit := squares(fitted, columns, X)) < least:
-                least, best = misfit, squares(judged, columns, X)
-                spread = sigma_squares(fitted, judged, columns) if fold == FOLDS else 0.0
-        return best, spread
-
 
 SURE = 1.5  # A law is taken when what it gains is this many times the standard deviation of that over the stretches
 PLAIN = 5.0  # Its parameter is at least so many sigma away from zero: of a hundred laws and joints none is there by chance
@@ -180,7 +82,7 @@ class _Choice:
         scores = dict[tuple[int, str], LawScore]()
         while True:
             search = self._search(laws, self.candidates)
-            tried = {key: search.score(*key) for key in search.places}
+            tried = {(j, name): search.score(j, name) for name, j in search.places}
             scores |= tried
             found = [_best(tried, j) for j in range(len(laws))]
             if not any(found):
@@ -220,7 +122,7 @@ class _Choice:
         for name in names:
             more = [*others[:j], (*own, name), *others[j + 1 :]]
             search, block = self._search(more, {}), self.candidates[name]
-            size = search.products.in_sigmas(block.law.symbol, j) if isinstance(block, ShapedFriction) else np.inf
+            size = search.in_sigmas(block.law.symbol, j) if isinstance(block, ShapedFriction) else np.inf
             error = float(search.errors[j])
             if np.isfinite(error) and abs(size) > PLAIN and not self._spoils(search, [*others[:j], own, *others[j + 1 :]], j):
                 # A size below zero is a law of another form, stood on its head.
@@ -229,9 +131,9 @@ class _Choice:
                 break
         return min(marks)[2] if marks else own
 
-    def _spoils(self, search: LawSearch, before: Sequence[tuple[str, ...]], j: int) -> bool:
+    def _spoils(self, search: HeldOutProducts, before: Sequence[tuple[str, ...]], j: int) -> bool:
         """True if friction of a joint newly falls at speeds beyond those of the logs."""
-        return falls(search.products.start, j) and not falls(self._search(before, {}).products.start, j)
+        return falls(search.start, j) and not falls(self._search(before, {}).start, j)
 
     def _needed(self, laws: Sequence[tuple[str, ...]], j: int) -> tuple[str, ...]:
         """Return the laws of a joint without those that gain nothing beside the others."""
@@ -285,12 +187,12 @@ class _Choice:
 
     def _search(
         self, laws: Sequence[tuple[str, ...]], candidates: Mapping[str, AbstractBlock], gone: Sequence[str] = ()
-    ) -> LawSearch:
+    ) -> HeldOutProducts:
         """Return the comparison of further laws, beside these with their own shapes, without some parameters."""
         key = tuple(laws), tuple(gone)
         if key not in self._settled:
             self._settled[key] = settled(self.problem.with_basis(self._basis(laws, gone)))
-        return LawSearch(HeldOutProducts.of(self._settled[key], candidates))
+        return HeldOutProducts.of(self._settled[key], candidates)
 
     @cached_property
     def _settled(self) -> dict[tuple[tuple[tuple[str, ...], ...], tuple[str, ...]], Problem]:
