@@ -5,7 +5,7 @@ W. Khalil, M. Gautier and P. Lemoine, "Identification of the payload inertial pa
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
@@ -146,17 +146,10 @@ def difference(robot: LoadedRobot) -> PayloadEstimate:
     own = robot.basis.of(robot.basis.named(*robot.names))
     problem = Problem(marked(robot.loaded, 1.0), own, ExplicitModel(), robot.chain)
     rows = problem.rows  # what is known of the payload is out of their Y
-    Y, W = rows.Y - first.Y, rows.W
-    weight = np.ones(rows.kinds)
-    for _ in range(2):
-        w = np.tile(weight, len(Y) // rows.kinds) * (rows.valid & first.valid)
-        X, *_ = np.linalg.lstsq(W * w[:, None], Y * w, rcond=None)
-        left = rows.by_kind((Y - W @ X) * (rows.valid & first.valid))
-        weight = 1 / np.sqrt(np.maximum(np.sum(left**2, axis=-1) / np.maximum(rows.count, 1), 1e-300))
-    w = np.tile(weight, len(Y) // rows.kinds) * (rows.valid & first.valid)
-    A: Array = np.asarray(W * w[:, None], dtype=np.float64)
-    covariance: Array = np.asarray(np.linalg.inv(A.T @ A), dtype=np.float64)
-    return PayloadEstimate(robot.names, np.asarray(X, dtype=np.float64), covariance, robot.known)
+    factors = replace(rows, Y=rows.Y - first.Y).factors_of(np.asarray(rows.valid & first.valid, dtype=np.float64))
+    factors.together.check()
+    covariance = factors.fit(2).factor.inverse(np.array(True))
+    return PayloadEstimate(robot.names, factors.fit(1).X, covariance, robot.known)
 
 
 WAYS: Mapping[str, Callable[[LoadedRobot], PayloadEstimate]] = {
