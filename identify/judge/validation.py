@@ -126,7 +126,8 @@ def validate(held_out: Problem, X: Array, covariance: Array | None = None, noise
     rest = 1.0 - signals.weight
     rest[..., list(signals.log.missing), :] = 0.0
     standing = chain.operator.map(left.equations, left.equations.weighted_as(rest), chain.grid(signals.log))
-    still = rows.by_kind(standing.measurement(left.everywhere)), shares(standing), standing.outside > 0
+    still = rows.by_kind(standing.measurement(left.everywhere)), shares(standing)
+    squares, count_still = (np.sum(x**2, axis=-1, where=standing.outside > 0) for x in still)
     rms, level, R2, correlation, count = zip(*(joint.judged() for joint in moving), strict=True)
     if not any(count):
         raise LogError(
@@ -139,7 +140,7 @@ def validate(held_out: Problem, X: Array, covariance: Array | None = None, noise
         noise = np.full(basis.n, np.nan)
     noise = np.where(np.isfinite(rms), noise, np.nan)
     left_open = [joint.open(covariance) for joint in moving]
-    still_rms = [_rms_of(*(x[j] for x in still)) for j in range(basis.n)]
+    still_rms = np.sqrt(np.divide(squares, count_still, out=np.full(basis.n, np.nan), where=count_still > 0))
     return Validation(*map(np.array, (rms, level, R2, still_rms, correlation, bound, count, noise, left_open)))
 
 
@@ -240,9 +241,3 @@ class _Joint:
             pairs = int(np.count_nonzero(valid[lag:] & valid[:-lag]))
             departures.append(float(rho[lag:] @ rho[:-lag]) / variance / sqrt(max(pairs, 1)))
         return max(departures, key=abs) / sqrt(max(int(np.count_nonzero(self.valid)), 1))
-
-
-def _rms_of(x: Array, share: Array, there: npt.NDArray[np.bool_]) -> float:
-    """Return the rms of rows of which the mask leaves shares; NaN if there are none."""
-    rows = float(np.sum(share[there] ** 2))
-    return sqrt(float(np.sum(x[there] ** 2)) / rows) if rows > 0 else np.nan
