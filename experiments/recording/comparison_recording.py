@@ -21,7 +21,8 @@ from idbench.experiments.recording.chart import NARROW, SYMBOLS, Chart, send_key
 from idbench.experiments.recording.columns import NANOSECONDS, part, seconds
 from idbench.experiments.recording.compared import Compared, difference, differences, estimates, named_runs, shift_of
 from idbench.experiments.recording.folder import BASE, INNER, files
-from idbench.experiments.recording.identification_recording import ROLES, RunRecording, layer, recording_id
+from idbench.experiments.recording.identification_layer import Layer
+from idbench.experiments.recording.identification_recording import ROLES, RunRecording, recording_id
 from idbench.experiments.recording.lanes import about
 from idbench.experiments.recording.layouts import tabs
 from idbench.experiments.recording.motion_layer import Base
@@ -50,7 +51,7 @@ def record_table1(table: Table1, audience: Audience | None = None) -> list[tuple
         request = Request(chain=chain, estimator="OLS", trim=scenario.quintic().rest)
         result = fit(request, Logs((log,), truth=table.truth))
         known = set().union(*(stream.paths for _, stream in streams))
-        streams.append(layer(base.stream.name, result, table.robot.joints, known, audience))
+        streams.append(Layer(base.stream.name, result, table.robot.joints, known, audience).send())
     return streams
 
 

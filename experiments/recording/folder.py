@@ -66,7 +66,7 @@ def merge(paths: Sequence[Path], tab: str, out: Path) -> None:
     stream = Stream(name)
     stream.open_with(tabs(entities, tab))
     for path in reversed(paths):
-        stream.copy(RrdReader(path))
+        stream.copy(path)
     stream.write(out)
 
 
@@ -76,7 +76,7 @@ def rearranged(paths: Sequence[Path], fresh: Stream) -> list[tuple[str, Stream]]
     for path in paths:
         if path.name not in (BASE, INNER):
             stream = Stream(name, layer=True)
-            stream.copy(RrdReader(path))
+            stream.copy(path)
             stream.arrange(tabs(entities | fresh.paths))
             streams.append((path.name, stream))
     return streams

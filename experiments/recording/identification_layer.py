@@ -9,6 +9,7 @@ from idbench.experiments.identification.fit import Fit
 from idbench.experiments.recording.audience import Audience
 from idbench.experiments.recording.chart import send_keys
 from idbench.experiments.recording.columns import part, parts, seconds, shown, time_columns
+from idbench.experiments.recording.folder import layer_file
 from idbench.experiments.recording.lanes import Lanes, estimates_table, mask_states, noise_table, short_table
 from idbench.experiments.recording.layouts import tabs
 from idbench.experiments.recording.residual_charts import ResidualCharts, send_iterations, send_parameters
@@ -96,8 +97,8 @@ class Layer:
         self._signals = fit.problem.signals[0]
         self._called = fit.request.label if self._shade else ""
 
-    def send(self) -> None:
-        """Send everything."""
+    def send(self) -> tuple[str, Stream]:
+        """Send everything; return the stream, and the name of its file."""
         self._motion()
         for form, estimate in self._fit.estimates.items():
             at, color = f"{self._at}/{form}", self._color(form)
@@ -124,6 +125,7 @@ class Layer:
         self.stream.keep_sizes()
         self.stream.arrange(tabs(self._known | self.stream.paths))
         self.stream.breathe(0.0)
+        return layer_file(self._fit.request.label), self.stream
 
     def _color(self, form: str) -> Color:
         return model_color(form, self._shade)

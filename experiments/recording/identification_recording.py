@@ -1,10 +1,7 @@
 """The recordings of a run and of a log: a base, a layer inside the loop, and a layer for each identification."""
 
 import hashlib
-from collections.abc import Sequence
 from pathlib import Path
-
-from rerun.chunk import RrdReader
 
 from idbench.experiments.errors import ResultsError
 from idbench.experiments.identification.fit import Fit
@@ -79,7 +76,7 @@ class RunRecording:
         if is_long([ran.run.alone()]):  # of which no rows are kept
             return streams
         there = set().union(*(stream.paths for _, stream in streams))
-        return [*streams, layer(self.base.stream.name, ran.fit, ran.run.robots[0].joints, there, self._audience)]
+        return [*streams, Layer(self.base.stream.name, ran.fit, ran.run.robots[0].joints, there, self._audience).send()]
 
 
 def record_log(fit: Fit, audience: Audience | None = None) -> list[tuple[str, Stream]]:
@@ -92,7 +89,7 @@ def record_log(fit: Fit, audience: Audience | None = None) -> list[tuple[str, St
     base.replay(log, {}, qd)
     base.end(log.q)
     base.finish(about("log", "", ("measured",)))
-    return [(BASE, base.stream), layer(base.stream.name, fit, robot.joints, base.stream.paths, audience)]
+    return [(BASE, base.stream), Layer(base.stream.name, fit, robot.joints, base.stream.paths, audience).send()]
 
 
 def add_layer(folder: Path, fit: Fit, audience: Audience | None = None) -> list[tuple[str, Stream]]:
@@ -110,24 +107,12 @@ def add_layer(folder: Path, fit: Fit, audience: Audience | None = None) -> list[
         raise ResultsError(f"there is no {BASE} in {folder} to add a layer to: give --out for a recording of its own")
     name, there = known(others)
     if audience:
-        show(name, others, audience)
-    made = layer(name, fit, fit.robot_model.robot.joints, there, audience)
+        whole = Stream(name, audience)
+        for path in reversed(others):
+            whole.copy(path)
+        whole.close()
+    made = Layer(name, fit, fit.robot_model.robot.joints, there, audience).send()
     return [made, *rearranged(others, made[1])]
-
-
-def show(name: str, paths: Sequence[Path], audience: Audience) -> None:
-    """Send the files of a recording to who watches."""
-    stream = Stream(name, audience)
-    for path in reversed(paths):
-        stream.copy(RrdReader(path))
-    stream.close()
-
-
-def layer(name: str, fit: Fit, joints: Sequence[str], there: set[str], audience: Audience | None = None) -> tuple[str, Stream]:
-    """Return the stream of an identification's layer, and the name of its file."""
-    made = Layer(name, fit, joints, there, audience)
-    made.send()
-    return layer_file(fit.request.label), made.stream
 
 
 def recording_id(name: str, content: bytes) -> str:

@@ -126,8 +126,9 @@ class Stream:
         nothing = [" "] * len(STATES)  # words would be cut off where a state is short: the view's title tells the colours
         self.keep(path, rr.StateConfiguration(values=list(STATES), labels=nothing, colors=list(STATES.values())))
 
-    def copy(self, reader: RrdReader) -> None:
+    def copy(self, path: Path) -> None:
         """Send what another file of the recording holds."""
+        reader = RrdReader(path)
         for entry in reader.recordings():
             for recording in self._targets:
                 rr.send_chunks(reader.stream(store=entry), recording=recording)
