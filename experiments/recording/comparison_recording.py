@@ -44,7 +44,7 @@ def record_table1(table: Table1, audience: Audience | None = None) -> list[tuple
     base.stream.describe(scenario=to_toml(scenario), seed=str(scenario.seed), fs_hz=f"{log.fs:g}")
     planned = {"q/planned": reference.q, "qd/planned": reference.qd, "qdd/planned": reference.qdd}
     base.replay(log, planned, reference.qd)
-    base.end(log.q)
+    base.arm.trace(log.q)
     base.finish(table1_markdown(table))
     streams = [(BASE, base.stream)]
     for chain in table.chains:

@@ -36,7 +36,7 @@ def record_excited(found: Excited, audience: Audience | None = None) -> list[tup
     _, motion = found.planned(SHOWN)
     base = Base(recording_id(scenario.name, to_toml(scenario).encode()), robot, SHOWN, ("planned",), motion.qd, audience)
     base.stream.describe(scenario=to_toml(scenario), seed=str(found.design.seed), fs_hz=f"{scenario.fs:g}")
-    base.make_room(motion.q)
+    base.arm.trace(motion.q)
     curves = {"q/designed": motion.q, "qd/designed": motion.qd, "qdd/designed": motion.qdd}
     base.add(0, curves, {"planned": motion.q}, motion.qd)
     _send_limits(base.stream, found)

@@ -56,7 +56,7 @@ class RunRecording:
         self.base = Base(recording_id(scenario.name, written.encode()), robot, fs, ROLES, planned.qd, audience)
         self.base.stream.describe(scenario=written, seed=str(scenario.seed), fs_hz=f"{scenario.fs:g}")
         if audience:  # so that the view holds the whole motion from the beginning
-            self.base.make_room(planned.q)
+            self.base.arm.trace(planned.q)
             joints = parts(robot.joints)
             robot_model = RobotModel(scenario.robot) if robot_model is None else robot_model
             self.base.live = LiveIdentification(self.base.stream, robot_model, CHAIN, scenario.channel, scenario.fs, joints)
@@ -64,7 +64,7 @@ class RunRecording:
 
     def end(self, run: Run) -> list[tuple[str, Stream]]:
         """Add what only the end of a simulation tells; return the streams by the name of their file."""
-        self.base.end(run.q[0])
+        self.base.arm.trace(run.q[0])
         return [(BASE, self.base.stream), *([(INNER, self.base.inner)] if self.base.inner else [])]
 
     def finish(self, ran: ScenarioRun) -> list[tuple[str, Stream]]:
@@ -87,7 +87,7 @@ def record_log(fit: Fit, audience: Audience | None = None) -> list[tuple[str, St
     channel = log.torque
     base.stream.describe(fs_hz=f"{log.fs:g}", torque=channel.meaning, torque_delay_s=f"{channel.delay:g}")
     base.replay(log, {}, qd)
-    base.end(log.q)
+    base.arm.trace(log.q)
     base.finish(about("log", "", ("measured",)))
     return [(BASE, base.stream), Layer(base.stream.name, fit, robot.joints, base.stream.paths, audience).send()]
 

@@ -148,7 +148,7 @@ class Base:
         self._slow = slow_speed(qd.T)
         for number, joint in enumerate(self._joints):  # for layouts, which see entities alone, in the order of their names
             self.stream.keep(f"joints/{number:03}/{joint}", rr.TextDocument(joint))
-        self._arm, self._lanes = Arm(self.stream, robot, roles), Lanes(self.stream, fs)
+        self.arm, self._lanes = Arm(self.stream, robot, roles), Lanes(self.stream, fs)
         self._before, self._turning = (np.empty(0), np.empty((0, robot.n))), np.zeros(robot.n)
         keys = {"measured": GREY, **dict(zip(self._joints, joint_colors(robot.n), strict=True))}
         send_keys(self.stream, "legend/joints", keys)
@@ -191,7 +191,7 @@ class Base:
         for path, values in signals.items():
             self._curves(self.stream, path, times if path in LOGGED else times[:1], values[kept])
         if seen.any():
-            self._arm.move([seconds(t[seen])], {role: q[seen] for role, q in poses.items()})
+            self.arm.move([seconds(t[seen])], {role: q[seen] for role, q in poses.items()})
         for j, joint in enumerate(self._joints):
             states = joint_states(qd[:, j], self._slow[j], None if limited is None else limited[:, j], self._turning[j])
             self._lanes.send(f"state/{joint}", t, states)
@@ -216,23 +216,11 @@ class Base:
         kept = self._kept(0, t)
         self._curves(self.stream, path, time_columns(t[kept], self._fs)[:1], values[kept])
 
-    def make_room(self, q: Array) -> None:
-        """Draw the way of the tool along planned positions [rad], shape (time, joint), before anything moves."""
-        self._arm.trace(q)
-
-    def end(self, q: Array) -> None:
-        """Draw the way of the tool along `q` [rad], shape (time, joint), once it is known."""
-        self._arm.trace(q)
-
     def finish(self, text: str) -> None:
         """Send a text about it all, and the layout."""
         self.stream.keep("about", rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN))
         self.stream.keep_sizes()
-        self.stream.arrange(tabs(self._paths))
-
-    @property
-    def _paths(self) -> set[str]:
-        return self.stream.paths | (self.inner.paths if self.inner else set())
+        self.stream.arrange(tabs(self.stream.paths | (self.inner.paths if self.inner else set())))
 
     def _curves(self, stream: Stream, path: str, times: Times, values: Array) -> None:
         if path not in stream.paths:
