@@ -11,7 +11,7 @@ from idbench.experiments.identification.fit import Fit
 from idbench.experiments.judgement.warnings import WEAK
 from idbench.experiments.recording.chart import NARROW, SQUARE, SYMBOLS, Chart
 from idbench.experiments.recording.columns import part
-from idbench.experiments.recording.scales import Linear, Signed, Words, decades, linear, listed
+from idbench.experiments.recording.scales import Linear, Signed, decades, linear, listed, named
 from idbench.experiments.recording.stream import Stream
 from idbench.experiments.reports.friction_curves import (
     FRICTIONS,
@@ -40,7 +40,7 @@ def _send(stream: Stream, at: str, estimate: Estimate) -> None:
     off, rounds = (path - estimate.X) / sigma, np.arange(float(len(path)))
     high = max(float(np.nanmax(np.abs(off))), 10 * LINEAR_UP_TO)
     scale = Signed("away from the last [sigma]", -1.3 * high, 1.3 * high, LINEAR_UP_TO)
-    axis = Words("round", -0.5, len(path) - 0.5, tuple(map(str, range(len(path)))))
+    axis = named("round", list(map(str, range(len(path)))))
     names = np.array_split(np.arange(len(estimate.names)), ceil(len(estimate.names) / len(JOINTS)))  # a colour each
     for k, members in enumerate(names):
         place = f"{at}/{k}_{part(estimate.names[members[0]])}_to_{part(estimate.names[members[-1]])}"

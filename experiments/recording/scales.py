@@ -42,9 +42,9 @@ class AbstractScale(ABC):
         """Values that are written beside the axis, as text."""
         return {float(v): _short(v) for v in self._values() if self.low <= v <= self.high}
 
-    @abstractmethod
     def _bent(self, x: Array) -> Array:
-        """Return values as they are spaced."""
+        """Return values as they are spaced: evenly."""
+        return x
 
     @abstractmethod
     def _values(self) -> Array:
@@ -54,9 +54,6 @@ class AbstractScale(ABC):
 @dataclass(frozen=True)
 class Linear(AbstractScale):
     """An axis of equal steps."""
-
-    def _bent(self, x: Array) -> Array:
-        return x
 
     def _values(self) -> Array:
         return round_values(self.low, self.high)
@@ -94,9 +91,6 @@ class Words(AbstractScale):
     """An axis of names, at 0, 1, 2 and so on."""
 
     words: tuple[str, ...] = ()
-
-    def _bent(self, x: Array) -> Array:
-        return x
 
     def _values(self) -> Array:
         return np.arange(float(len(self.words)))
