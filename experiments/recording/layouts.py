@@ -76,10 +76,10 @@ def excited(shelf: Shelf) -> Part:
     told = charts(shelf, "which stretch excites which parameter: bright is most", "excited/told/*")
     if not told:
         return None
-    limits = column(*(plot(shelf, _limit(path), f"limits/{path}") for path in sorted(shelf.last("limits/*"))))
+    limits = column(*(plot(shelf, _limit(path), f"limits/{path}") for path in sorted(shelf.parts("limits/*"))))
     left = column(arm(shelf), text(shelf, "about"), shares=[5, 3])
     middle = column(plot(shelf, "q [rad]", "q/designed"), plot(shelf, "qd [rad/s]", "qd/designed"), limits, shares=[1, 1, 4])
-    names = [path.partition("_")[2].replace("_", " ") for path in sorted(shelf.parents("excited/told/*/frame"))]
+    names = [path.partition("_")[2].replace("_", " ") for path in sorted(shelf.parts("excited/told/*/frame", -2))]
     pairs = zip(names, sigmas or [None] * len(told), told, strict=True)
     each = [column(*pair, shares=[1, 1], name=name) for name, *pair in pairs]
     return side_by_side("excited", left, middle, tabbed(each) if len(each) > 1 else each[0], shares=[5, 5, 6])
@@ -87,7 +87,7 @@ def excited(shelf: Shelf) -> Part:
 
 def servos(shelf: Shelf) -> Part:
     """Return servos: commands, measured and simulated positions, and residuals."""
-    joints = shelf.parents("servo/*/residual")
+    joints = shelf.parts("servo/*/residual", -2)
     if not joints:
         return None
     each = [
@@ -109,8 +109,7 @@ def _limit(path: str) -> str:
 
 def study(shelf: Shelf) -> Part:
     """Return a study: errors over the values of each axis, all parameters together and one by one, and the answer."""
-    axes = list(dict.fromkeys(path.split("/")[1] for path in shelf.of("study/*/typical/frame")))
-    pages = [_over_axis(shelf, axis) for axis in axes]
+    pages = [_over_axis(shelf, axis) for axis in shelf.parts("study/*/typical/frame", 1)]
     sigmas = charts(shelf, "all errors over their sigma", "study/sigmas")
     answer = column(text(shelf, "answer"), *sigmas, shares=[5.0, *[2.0] * len(sigmas)])
     if not pages:  # nothing varies, or no run gave an estimate

@@ -61,8 +61,8 @@ def torques(shelf: Shelf) -> Part:
 
 def friction(shelf: Shelf) -> Part:
     """Return friction over velocity, residuals over velocity and position, where cogging shows, and the friction parameters."""
-    joints = shelf.parents("identify/*/over_velocity/*/frame")
-    names = [name for name in sorted(shelf.last("identify/*/*/estimate/*"), key=_order) if name.startswith("F")]
+    joints = shelf.parts("identify/*/over_velocity/*/frame", -2)
+    names = [name for name in sorted(shelf.parts("identify/*/*/estimate/*"), key=_order) if name.startswith("F")]
     if not joints:
         return None
     if len(joints) * len(shelf.methods) <= FEW:
@@ -137,7 +137,7 @@ def noise(shelf: Shelf) -> Part:
     smoothed = [
         plot(shelf, f"{x} {r} [{unit}], measured - smoothed, and sigma of the smoothed one",
              f"identify/*/smoothed_band/{x}/{r}", f"identify/*/measured_less_smoothed/{x}/{r}")
-        for r in shelf.last("identify/*/smoothed_band/q/*") for x, unit in (("q", "rad"), ("qd", "rad/s"))
+        for r in shelf.parts("identify/*/smoothed_band/q/*") for x, unit in (("q", "rad"), ("qd", "rad/s"))
     ]  # fmt: skip
     parts = text(shelf, "identify/*/noise"), _in_grid("spectra", spectra), _in_grid("smoothed motion", smoothed)
     return side_by_side("noise", *parts, shares=[3, 6, 6])
@@ -145,7 +145,7 @@ def noise(shelf: Shelf) -> Part:
 
 def excitation(shelf: Shelf) -> Part:
     """Return the columns of W, and its singular values."""
-    rows = shelf.last("identify/*/*/columns/*")
+    rows = shelf.parts("identify/*/*/columns/*")
     found = [shelf.of(f"identify/*/*/columns/{row}")[0] for row in rows]
     W = [
         column(plot(shelf, f"columns of W, {row}, to unit length", path), keys(shelf, f"{path}/keys"), shares=[8, 1])
@@ -164,7 +164,7 @@ def iterations(shelf: Shelf) -> Part:
 def parameters(shelf: Shelf) -> Part:
     """Return every parameter with its interval beside the truth, and how every estimate comes about."""
     found = charts(shelf, "{1}: {4}", "identify/*/parameters/*/*", SQUARE, 0.2)
-    names = sorted(shelf.last("identify/*/*/estimate/*"), key=_order)
+    names = sorted(shelf.parts("identify/*/*/estimate/*"), key=_order)
     table, running = text(shelf, "identify/*/report"), _estimates(shelf, names) if names else None
     if not found:  # of a log that still grows
         return running
@@ -228,7 +228,7 @@ def _of_models(shelf: Shelf, kind: str, row: str) -> list[str]:
 
 
 def _rows(shelf: Shelf) -> list[str]:
-    return sorted(shelf.last("identify/*/*/residual/*"), key=lambda row: row.partition(" ")[0] in UNITS)
+    return sorted(shelf.parts("identify/*/*/residual/*"), key=lambda row: row.partition(" ")[0] in UNITS)
 
 
 def _unit(row: str) -> str:

@@ -59,18 +59,14 @@ class Shelf:
         low, high = min(known, key=float), max(known, key=float)
         return f", rms {high}" if low == high else f", largest rms {high}"
 
-    def parents(self, pattern: str) -> list[str]:
-        """Parents of the matching entities, each once."""
-        return list(dict.fromkeys(path.split("/")[-2] for path in self.of(pattern)))
+    def parts(self, pattern: str, number: int = -1) -> list[str]:
+        """Parts of this number, the last by default, of the paths of the matching entities, each once."""
+        return list(dict.fromkeys(path.split("/")[number] for path in self.of(pattern)))
 
     @property
     def methods(self) -> list[str]:
         """Identifications, as they are called."""
-        return list(dict.fromkeys(path.split("/")[1] for path in self.of("identify/*/report")))
-
-    def last(self, pattern: str) -> list[str]:
-        """Last parts of the matching entities, each once."""
-        return list(dict.fromkeys(path.rsplit("/", 1)[-1] for path in self.of(pattern)))
+        return self.parts("identify/*/report", 1)
 
 
 def plot(shelf: Shelf, name: str, *patterns: str, legend: bool = False) -> Part:
