@@ -95,9 +95,9 @@ class Chart:
         if listed:
             self.list_entry(name, color)
 
-    def segments(self, name: str, x: Array, y: Array, color: Color, width: float = 1.0) -> None:
-        """Draw a line from each first to each second value, arrays of shape (segment, 2): intervals, error bars."""
-        ends = np.stack([self._where(x[:, k], y[:, k]) for k in (0, 1)], axis=1)
+    def intervals(self, name: str, low: Array, high: Array, y: Array, color: Color, width: float) -> None:
+        """Draw a level line at each y, from `low` to `high`, arrays of shape (interval,)."""
+        ends = np.stack([self._where(low, y), self._where(high, y)], axis=1)
         self._strips(f"segments/{part(name)}", list(ends[np.isfinite(ends).all(axis=(1, 2))]), color, width, LINE_ORDER)
 
     def marks(self, name: str, x: Array, y: Array, color: Color, symbol: Symbol = "circle") -> None:

@@ -67,9 +67,7 @@ def _send_sigmas(stream: Stream, found: Excited) -> None:
     for at, members in _parts(names):
         chart = Chart(stream, f"excited/sigma/{at}", x, listed("", [names[p] for p in members]), SQUARE)
         y = np.arange(float(len(members)))
-        chart.segments(
-            "random", np.stack([others[0, members], others[-1, members]], axis=1), np.stack([y, y], axis=1), GREY, 3.0
-        )
+        chart.intervals("random", others[0, members], others[-1, members], y, GREY, 3.0)
         chart.list_entry("random motions", GREY)
         chart.marks("this motion", (found.sigma / found.median)[members], y, FORMS["explicit"])
         chart.list_entry("this motion", FORMS["explicit"])
@@ -89,9 +87,9 @@ def _send_told(stream: Stream, found: Excited) -> None:
         level, row = np.rint((LEVELS - 1) * strength.T).astype(int), np.arange(float(len(members)))
         for k in range(LEVELS):
             which, stretch = np.nonzero(level == k)
-            ends = middles[stretch, None] + np.array([-0.46, 0.46]) * duration / STRETCHES
+            begins, ends = (middles[stretch] + half * duration / STRETCHES for half in (-0.46, 0.46))
             color: Color = [int(v) for v in DARK + (BRIGHT - DARK) * k / (LEVELS - 1)]
-            chart.segments(f"level {k}", ends, np.stack([row[which]] * 2, axis=1), color, 5.0)
+            chart.intervals(f"level {k}", begins, ends, row[which], color, 5.0)
 
 
 def _parts(names: Sequence[str]) -> Iterator[tuple[str, npt.NDArray[np.intp]]]:

@@ -71,7 +71,7 @@ def send_parameters(stream: Stream, at: str, fit: Fit, number: int = 0) -> None:
             x, half = off[form][members], reach[form][members]
             y = np.arange(float(len(members))) + ASIDE * (i - (len(fit.estimates) - 1) / 2)
             color = model_color(form, number)
-            chart.segments(form, np.stack([x - half, x + half], axis=1), np.stack([y, y], axis=1), color, 1.5)
+            chart.intervals(form, x - half, x + half, y, color, 1.5)
             chart.marks(form, x, y, color, SYMBOLS[i % len(SYMBOLS)])
     _singular_values(stream, at, fit, number)
 

@@ -53,7 +53,7 @@ def drawn(tmp_path):
     chart.dots("dots", np.array([5.0, np.nan, 20.0, 5.0]), np.array([10.0, 10.0, 10.0, 1e9]), (1, 2, 3))
     chart.line("curve", np.arange(5.0), np.array([1.0, 10.0, np.nan, 10.0, 100.0]), (1, 2, 3))
     chart.marks("marks", np.array([np.nan, 5.0]), np.array([10.0, 10.0]), (1, 2, 3), "square")
-    chart.segments("bars", np.array([[1.0, 1.0], [np.nan, 2.0]]), np.array([[1.0, 10.0], [1.0, 2.0]]), (1, 2, 3))
+    chart.intervals("bars", np.array([1.0, np.nan]), np.array([2.0, 2.0]), np.array([10.0, 2.0]), (1, 2, 3), 1.0)
     stream.write(tmp_path / "drawn.rrd")
 
     def read(path, component):
