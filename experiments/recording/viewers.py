@@ -6,7 +6,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 from urllib.parse import quote, urlsplit
 
@@ -19,18 +19,11 @@ PATIENCE = 20.0  # How long a viewer may take to start, or to take what is on it
 
 def address(url: str) -> tuple[str, int]:
     """Return host and port of a viewer; raise ExperimentError if `url` is no address of one."""
-    try:
+    with suppress(ValueError):
         parts = urlsplit(url)
-        scheme = parts.scheme
-        host = parts.hostname
-        port = parts.port
-    except ValueError:
-        scheme = ""
-        host = None
-        port = None
-    if scheme not in ("rerun", "rerun+http", "rerun+https") or not host or port is None:
-        raise ExperimentError(f"--connect {url} is no address of a viewer: it looks like rerun+http://127.0.0.1:9876/proxy")
-    return host, port
+        if parts.scheme in ("rerun", "rerun+http", "rerun+https") and parts.hostname and parts.port is not None:
+            return parts.hostname, parts.port
+    raise ExperimentError(f"--connect {url} is no address of a viewer: it looks like rerun+http://127.0.0.1:9876/proxy")
 
 
 def answers(url: str) -> bool:
