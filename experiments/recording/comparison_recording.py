@@ -67,12 +67,8 @@ def finish_table2(recording: RunRecording, table: Table2) -> list[tuple[str, Str
     _send_processings(stream, table)
     for form in next(iter(table.attribution.values())):
         _send_causes(stream, table, form)
-    described = about(table.scenario.name, table.scenario.origin, ROLES)
-    for name, text in (("table2", _markdown(table)), ("about", described)):
-        stream.keep(name, rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN))
-    stream.keep_sizes()
-    known = set().union(*(s.paths for _, s in streams))
-    stream.arrange(tabs(known))
+    stream.page("table2", _markdown(table))
+    recording.base.finish(about(table.scenario.name, table.scenario.origin, ROLES))
     return streams
 
 
@@ -95,7 +91,7 @@ def _send_causes(stream: Stream, table: Table2, form: str) -> None:
     """Send the error of every parameter by each cause alone, as a table; large ones in bold."""
     rows = ([cause, *(_emphasized(e) for e in errors[form])] for cause, errors in table.attribution.items())
     text = markdown(f"Error [%] of each parameter by each cause alone, **{form}** model", list(table.truth), rows)
-    stream.keep(f"attribution/{form}", rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN))
+    stream.page(f"attribution/{form}", text)
 
 
 def _emphasized(error_percent: float) -> str:
@@ -139,8 +135,7 @@ def compare(folders: Sequence[Path], tab: str, out: Path) -> None:
         _copy(stream, run, number, shift or 0.0)
         if number and shift is not None:
             _send_differences(stream, runs[0], run, shift)
-    text = "\n\n".join([estimates(runs), *notes])
-    stream.keep("comparison", rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN))
+    stream.page("comparison", "\n\n".join([estimates(runs), *notes]))
     stream.keep_sizes()
     stream.arrange(tabs(stream.paths, tab))
     stream.write(out)

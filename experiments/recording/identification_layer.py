@@ -116,12 +116,9 @@ class Layer:
         send_iterations(self.stream, self._at, self._fit)
         keys = {f"{self._fit.request.label}:": GREY, **{form: self._color(form) for form in self._fit.estimates}}
         send_keys(self.stream, f"legend/{self._fit.request.label}", keys)
-        for name, text in (
-            ("report", estimates_table(self._fit)),
-            ("estimates", short_table(self._fit)),
-            ("noise", noise_table(self._fit, self._joints)),
-        ):
-            self.stream.keep(f"{self._at}/{name}", rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN))
+        self.stream.page(f"{self._at}/report", estimates_table(self._fit))
+        self.stream.page(f"{self._at}/estimates", short_table(self._fit))
+        self.stream.page(f"{self._at}/noise", noise_table(self._fit, self._joints))
         self.stream.keep_sizes()
         self.stream.arrange(tabs(self._known | self.stream.paths))
         self.stream.breathe(0.0)

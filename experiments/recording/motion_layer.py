@@ -218,7 +218,7 @@ class Base:
 
     def finish(self, text: str) -> None:
         """Send a text about it all, and the layout."""
-        self.stream.keep("about", rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN))
+        self.stream.page("about", text)
         self.stream.keep_sizes()
         self.stream.arrange(tabs(self.stream.paths | (self.inner.paths if self.inner else set())))
 

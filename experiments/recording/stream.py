@@ -92,6 +92,10 @@ class Stream:
             for recording in self._targets:
                 recording.log(path, thing, static=True)
 
+    def page(self, path: str, text: str) -> None:
+        """Send a text in Markdown."""
+        self.keep(path, rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN))
+
     def style(self, path: str, names: Sequence[str], colors: Sequence[Color], width: float = 1.5) -> None:
         """Announce an entity of curves."""
         self.keep(path, rr.SeriesLines(names=names, colors=colors, widths=[width] * len(names)))

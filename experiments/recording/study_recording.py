@@ -211,8 +211,7 @@ class StudyRecording:
     def _draw(self, cells: Sequence[Cell]) -> None:
         solved = [cell for cell in cells if cell.runs]
         worst = worst_runs(solved)
-        written = rr.TextDocument(_text(self._study, cells, self._folder, worst), media_type=rr.MediaType.MARKDOWN)
-        self.stream.keep("answer", written)
+        self.stream.page("answer", _text(self._study, cells, self._folder, worst))
         if not solved:
             return
         for axis in self._study.every_axis:
