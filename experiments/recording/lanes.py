@@ -5,12 +5,13 @@ from itertools import chain
 
 import numpy as np
 import numpy.typing as npt
+import rerun as rr
 
 from idbench.experiments.identification.fit import Fit
 from idbench.experiments.recording.columns import time_columns
 from idbench.experiments.recording.stream import Stream
 from idbench.experiments.reports.estimates import LEAST, EstimatesTable, models_apart
-from idbench.experiments.text import markdown
+from idbench.experiments.text import STATES, markdown
 from idbench.identify import Array
 
 WHERE = {"friction": "friction", "drive": "friction"}
@@ -95,12 +96,15 @@ class Lanes:
     def send(self, path: str, t: Array, states: npt.NDArray[np.str_]) -> None:
         """Send the states of a lane at the instants `t` [s]."""
         if path not in self._last:
-            self._stream.lanes(path)
+            nothing = [" "] * len(STATES)  # words would be cut off where a state is short: the view's title tells the colours
+            style = rr.StateConfiguration(values=list(STATES), labels=nothing, colors=list(STATES.values()))
+            self._stream.keep(path, style)
         now = np.concatenate([[self._last.get(path, "")], states])
         self._last[path] = str(now[-1])
         changed = np.flatnonzero(now[1:] != now[:-1])
         if len(changed):
-            self._stream.states(path, time_columns(t[changed], self._fs), now[1 + changed].tolist())
+            columns = rr.StateChange.columns(state=now[1 + changed].tolist())
+            self._stream.send(path, time_columns(t[changed], self._fs), columns)
 
 
 def joint_states(qd: Array, slow: float, limited: Array | None, before: float) -> npt.NDArray[np.str_]:

@@ -12,7 +12,7 @@ from rerun.chunk import Chunk, RrdReader
 from idbench.experiments.errors import ResultsError
 from idbench.experiments.recording.audience import Audience
 from idbench.experiments.recording.columns import Times, scalars
-from idbench.experiments.text import STATES, Color
+from idbench.experiments.text import Color
 from idbench.identify import Array
 
 APPLICATION = "idbench"
@@ -120,15 +120,6 @@ class Stream:
         if path not in (self._drafted if self._draft else self.paths):
             self.style(path, [name], [color], width)
         self.curves(path, times, values)
-
-    def states(self, path: str, times: Times, states: Sequence[str]) -> None:
-        """Send states, each from its time until the next."""
-        self.send(path, times, rr.StateChange.columns(state=states))
-
-    def lanes(self, path: str) -> None:
-        """Announce an entity of states."""
-        nothing = [" "] * len(STATES)  # words would be cut off where a state is short: the view's title tells the colours
-        self.keep(path, rr.StateConfiguration(values=list(STATES), labels=nothing, colors=list(STATES.values())))
 
     def copy(self, path: Path) -> None:
         """Send what another file of the recording holds."""
