@@ -1,6 +1,6 @@
 """The layer of an identification: what its models make of a recorded motion, and their residuals."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 import rerun as rr
@@ -45,14 +45,14 @@ def send_smoothed(stream: Stream, at: str, fit: JointFit, joints: Sequence[str])
     measured = {"q": q, "qd": np.gradient(q, 1 / log.fs, axis=0)}
     times = [seconds(motion.t)]
     for name, sigma in (("q", motion.sigma_q), ("qd", motion.sigma_qd), ("qdd", motion.sigma_qdd)):
-        for joint, color, value, off in zip(joints, joint_colors(len(joints)), getattr(motion, name).T, sigma.T, strict=True):
-            _send_band(stream, f"{at}/smoothed/{name}/{joint}", motion.t, value, off, color)
-    for name, sigma in (("q", motion.sigma_q), ("qd", motion.sigma_qd)):
         for k, (joint, color) in enumerate(zip(joints, joint_colors(len(joints)), strict=True)):
-            left = measured[name][:, k] - getattr(motion, name)[:, k]
-            stream.style(f"{at}/measured_less_smoothed/{name}/{joint}", ["measured - smoothed"], [GREY], 1.0)
-            stream.curves(f"{at}/measured_less_smoothed/{name}/{joint}", times, left)
-            _send_band(stream, f"{at}/smoothed_band/{name}/{joint}", motion.t, 0 * left, sigma[:, k], color)
+            value = getattr(motion, name)[:, k]
+            _send_band(stream, f"{at}/smoothed/{name}/{joint}", motion.t, value, sigma[:, k], color)
+            if name in measured:
+                left = measured[name][:, k] - value
+                path = f"{at}/measured_less_smoothed/{name}/{joint}"
+                stream.curve(path, times, left, "measured - smoothed", GREY, 1.0)
+                _send_band(stream, f"{at}/smoothed_band/{name}/{joint}", motion.t, 0 * left, sigma[:, k], color)
 
 
 def _send_band(stream: Stream, path: str, t: Array, values: Array, sigma: Array, color: Sequence[int]) -> None:
@@ -101,7 +101,7 @@ class Layer:
         """Send everything; return the stream, and the name of its file."""
         self._motion()
         for form, estimate in self._fit.estimates.items():
-            at, color = f"{self._at}/{form}", self._color(form)
+            at, color = f"{self._at}/{form}", model_color(form, self._shade)
             width = FORM_WIDTHS.get(form, 1.5) / (1 + self._shade)  # so that what lies below shows
             names = row_names(form, estimate.rows.kinds, self._joints)
             send_rows(self.stream, at, f"{form} {self._called}".strip(), estimate, names, color, width)
@@ -114,7 +114,7 @@ class Layer:
         ResidualCharts(self.stream, self._at, self._fit, self._joints, self._shade).send()
         send_parameters(self.stream, self._at, self._fit, self._shade)
         send_iterations(self.stream, self._at, self._fit)
-        keys = {f"{self._fit.request.label}:": GREY, **{form: self._color(form) for form in self._fit.estimates}}
+        keys = {f"{self._fit.request.label}:": GREY, **{form: model_color(form, self._shade) for form in self._fit.estimates}}
         send_keys(self.stream, f"legend/{self._fit.request.label}", keys)
         self.stream.page(f"{self._at}/report", estimates_table(self._fit))
         self.stream.page(f"{self._at}/estimates", short_table(self._fit))
@@ -123,9 +123,6 @@ class Layer:
         self.stream.arrange(tabs(self._known | self.stream.paths))
         self.stream.breathe(0.0)
         return layer_file(self._fit.request.label), self.stream
-
-    def _color(self, form: str) -> Color:
-        return model_color(form, self._shade)
 
     def _motion(self) -> None:
         """Send the motion as it was measured, and as the rows see it, and which instants are masked."""
@@ -191,9 +188,8 @@ class Layer:
 
     def _truth(self) -> None:
         """Send the true parameters as lines from the beginning to the end."""
-        ends: Mapping[str, float] = self._fit.truth or {}
-        for name, value in ends.items():
-            times = time_columns(self._log.t[[0, -1]], self._log.fs)
+        times = time_columns(self._log.t[[0, -1]], self._log.fs)
+        for name, value in (self._fit.truth or {}).items():
             self.stream.curve(f"truth/{part(name)}", times, np.array([value, value]), "true", GREY, 3.0)
 
 
