@@ -210,14 +210,13 @@ class StudyRecording:
 
     def _draw(self, cells: Sequence[Cell]) -> None:
         solved = [cell for cell in cells if cell.runs]
-        worst = worst_runs(solved)
-        self.stream.page("answer", _text(self._study, cells, self._folder, worst))
+        worst = [(c, name, e, r, command(self._study, self._folder, c, r)) for c, name, e, r in worst_runs(solved)]
+        self.stream.page("answer", _text(self._study, cells, worst))
         if not solved:
             return
         for axis in self._study.every_axis:
             if len(axis.points) > 1:
-                AxisCharts(self.stream, axis, solved).send([(c, name, e, r, command(self._study, self._folder, c, r))
-                                                            for c, name, e, r in worst])  # fmt: skip
+                AxisCharts(self.stream, axis, solved).send(worst)
         _send_sigmas(self.stream, solved)
 
 
@@ -238,9 +237,6 @@ def _send_sigmas(stream: Stream, cells: Sequence[Cell]) -> None:
         chart.line(model, middle, share, FORMS.get(model, GREY))
 
 
-def _text(study: Study, cells: Sequence[Cell], folder: Path, worst: Sequence[tuple[Cell, str, float, int]]) -> str:
-    lines = [
-        f"- {name} {100 * e:+.2g} %: {where(cell, cells)}\n  `{command(study, folder, cell, run)}`"
-        for cell, name, e, run in worst[:LISTED]
-    ]
+def _text(study: Study, cells: Sequence[Cell], worst: Sequence[Worst]) -> str:
+    lines = [f"- {name} {100 * e:+.2g} %: {where(cell, cells)}\n  `{again}`" for cell, name, e, _, again in worst[:LISTED]]
     return "\n\n".join([f"# {study.question}", answer(cells, study.edges), TYPICAL, "## Worst runs", "\n".join(lines)])
