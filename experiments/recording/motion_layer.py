@@ -1,31 +1,27 @@
 """The base of a recording: a motion, what was planned, measured and true, and what the drives did."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 import rerun as rr
 
 from idbench.experiments.recording.audience import Audience
 from idbench.experiments.recording.chart import send_keys
-from idbench.experiments.recording.columns import POSES, Times, parts, seconds, shown, time_columns
+from idbench.experiments.recording.columns import POSES, Times, part, parts, poses, seconds, shown, time_columns
 from idbench.experiments.recording.lanes import Lanes, joint_states
 from idbench.experiments.recording.layouts import tabs
 from idbench.experiments.recording.stream import Stream
-from idbench.experiments.text import GREY, WIDTHS, joint_colors, kind_colors
+from idbench.experiments.text import GREY, MEASURED, PLANNED, WIDTHS, Color, joint_colors, kind_colors
 from idbench.identify import Array, MotionLog
 from idbench.identify.signals.masks import slow_speed
 from idbench.sim.drives.drive import BetweenEdges
 from idbench.sim.engine.watch import Inner, WatchedStretch
 from idbench.sim.robot.robot import Robot
+from idbench.sim.robot.scene import Mover, SceneShape, shapes
 
 if TYPE_CHECKING:
     from idbench.experiments.recording.live_layer import LiveIdentification
-from typing import Literal
-
-from idbench.experiments.recording.columns import part, poses
-from idbench.experiments.text import MEASURED, PLANNED, Color
-from idbench.sim.robot.scene import Mover, SceneShape, shapes
 
 ROLES: dict[str, Color | None] = {"true": None, "measured": MEASURED, "planned": PLANNED}
 """Arms that may be shown, and the colour of those that are drawn as wires around the first."""
@@ -59,7 +55,8 @@ class Arm:
             for shape in shapes(robot):
                 if role == roles[0] or shape.body in self._moving:
                     path = f"world/{role}/{part(shape.body)}/{part(shape.name)}"
-                    stream.keep(path, _drawn(shape, None if role == roles[0] else ROLES[role]), _pose(shape))
+                    where = rr.Transform3D(translation=shape.position, quaternion=rr.Quaternion(xyzw=shape.quaternion))
+                    stream.keep(path, _drawn(shape, None if role == roles[0] else ROLES[role]), where)
 
     def move(self, times: Times, where: Mapping[str, Array]) -> None:
         """Send where arms are, by their role, at positions [rad] of shape (time, joint)."""
@@ -78,17 +75,10 @@ class Arm:
             )
 
 
-Fill = Literal["solid", "majorwireframe"]
-
-
-def _pose(shape: SceneShape) -> rr.Transform3D:
-    return rr.Transform3D(translation=shape.position, quaternion=rr.Quaternion(xyzw=shape.quaternion))
-
-
 def _drawn(shape: SceneShape, wire: Color | None) -> rr.AsComponents:
     """Return a shape: solid in its own colour, or as wires of the colour `wire`."""
     color, size = [shape.rgba if wire is None else wire], shape.size
-    fill: Fill = "solid" if wire is None else "majorwireframe"
+    fill: Literal["solid", "majorwireframe"] = "solid" if wire is None else "majorwireframe"
     match shape.kind:
         case "box":
             return rr.Boxes3D(half_sizes=[size], colors=color, fill_mode=fill)
