@@ -115,7 +115,8 @@ def estimates(runs: Sequence[Compared]) -> str:
     if not models or not names:
         return "No model gave an estimate in all of them."
     found = [_of(run, models[0]) for run in runs]
-    truth, units = _truth(runs[0]), dict(zip(runs[0].summary["parameters"], runs[0].summary.get("units", ()), strict=False))
+    truth = dict(zip(runs[0].summary["parameters"], runs[0].summary.get("truth") or (), strict=False))
+    units = dict(zip(runs[0].summary["parameters"], runs[0].summary.get("units", ()), strict=False))
     head = [
         f"**Estimates**, {models[0]} model; the difference of the last from the first, in its sigma\n",
         f"| | true | {' | '.join(run.name for run in runs)} | difference |",
@@ -147,10 +148,6 @@ def difference(first: MotionLog, other: MotionLog, shift: float) -> tuple[Array,
 def _of(run: Compared, model: str) -> dict[str, tuple[float, float]]:
     found = run.summary["models"][model]
     return dict(zip(run.summary["parameters"], zip(found["estimate"], found["sigma"], strict=True), strict=True))
-
-
-def _truth(run: Compared) -> dict[str, float]:
-    return dict(zip(run.summary["parameters"], run.summary.get("truth") or (), strict=False))
 
 
 def _flat(settings: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
