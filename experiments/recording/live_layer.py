@@ -74,7 +74,10 @@ class LiveIdentification:
         self._identified = samples
         try:
             log = MotionLog(self._fs, np.concatenate(self._q), np.concatenate(self._tau), self._channel)
-            self._identify(log)
+            self.fit = fit(self._request, Logs((log,)))
+            with self._stream.draft():
+                for form, estimate in self.fit.estimates.items():
+                    self._show(form, estimate, float(log.t[-1]))
         except IdentificationError:  # too short yet, or not yet excited
             return False
         except Exception as error:  # the run is not lost because what is shown of it is
@@ -85,12 +88,6 @@ class LiveIdentification:
             )
             return False
         return True
-
-    def _identify(self, log: MotionLog) -> None:
-        self.fit = fit(self._request, Logs((log,)))
-        with self._stream.draft():
-            for form, estimate in self.fit.estimates.items():
-                self._show(form, estimate, float(log.t[-1]))
 
     def _show(self, form: str, estimate: Estimate, now: float) -> None:
         at, color = f"identify/{LABEL}/{form}", FORMS.get(form, GREY)
