@@ -1,7 +1,7 @@
 """Recordings in a notebook: rerun's viewer below a cell."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import rerun as rr
 from rerun.chunk import RrdReader
@@ -37,18 +37,14 @@ def notebook_viewer(results: Path, tab: str = "", width: int = 1200, height: int
         raise ResultsError(f"there is no recording in {results}: name a results folder, such as runs/table1")
     name, entities = known(paths)
     layout, recording = tabs(entities, tab), rr.RecordingStream(APPLICATION, recording_id=name)
-    shown: Any = _viewer(recording, layout, width, height)
+    try:
+        from rerun.notebook import Viewer
+
+        viewer = Viewer(width=width, height=height, recording=recording, blueprint=layout)
+    except ImportError as error:
+        raise ResultsError('rerun\'s notebook viewer is missing: uv pip install "rerun-sdk[notebook]"') from error
     for path in reversed(paths):
         reader = RrdReader(path)
         for entry in reader.recordings():
             rr.send_chunks(reader.stream(store=entry), recording=recording)
-    return shown
-
-
-def _viewer(recording: rr.RecordingStream, layout: Any, width: int, height: int) -> "Viewer":
-    try:
-        from rerun.notebook import Viewer
-
-        return Viewer(width=width, height=height, recording=recording, blueprint=layout)
-    except ImportError as error:
-        raise ResultsError('rerun\'s notebook viewer is missing: uv pip install "rerun-sdk[notebook]"') from error
+    return viewer
