@@ -22,7 +22,7 @@ from idbench.experiments.reports.friction_curves import (
     spectra,
 )
 from idbench.experiments.text import GREY, JOINTS, SIGMAS, Color, model_color, percent_reach
-from idbench.identify import Array, Estimate, Instants, binned, cutoffs
+from idbench.identify import Array, Instants, binned, cutoffs
 
 LINEAR_UP_TO = 1e-3  # Difference [sigma] up to which the axis is linear
 
@@ -30,24 +30,20 @@ LINEAR_UP_TO = 1e-3  # Difference [sigma] up to which the axis is linear
 def send_iterations(stream: Stream, at: str, fit: Fit) -> None:
     """Send, of estimators that go on from round to round, how far each parameter is from the last, in its sigma."""
     for model, estimate in fit.estimates.items():
-        if len(estimate.path) > 1:
-            _send(stream, f"{at}/iterations/{model}", estimate)
-
-
-def _send(stream: Stream, at: str, estimate: Estimate) -> None:
-    path = np.array(estimate.path)
-    sigma = np.where(estimate.standard_errors > 0, estimate.standard_errors, 1.0)
-    off, rounds = (path - estimate.X) / sigma, np.arange(float(len(path)))
-    high = max(float(np.nanmax(np.abs(off))), 10 * LINEAR_UP_TO)
-    scale = Signed("away from the last [sigma]", -1.3 * high, 1.3 * high, LINEAR_UP_TO)
-    axis = named("round", list(map(str, range(len(path)))))
-    names = np.array_split(np.arange(len(estimate.names)), ceil(len(estimate.names) / len(JOINTS)))  # a colour each
-    for k, members in enumerate(names):
-        place = f"{at}/{k}_{part(estimate.names[members[0]])}_to_{part(estimate.names[members[-1]])}"
-        chart = Chart(stream, place, axis, scale, NARROW)
-        for color, p in zip(JOINTS, members, strict=False):
-            chart.line(estimate.names[p], rounds, off[:, p], color)
-            chart.marks(f"{estimate.names[p]} ", rounds, off[:, p], color)
+        path, names = np.array(estimate.path), estimate.names
+        if len(path) <= 1:
+            continue
+        sigma = np.where(estimate.standard_errors > 0, estimate.standard_errors, 1.0)
+        off, rounds = (path - estimate.X) / sigma, np.arange(float(len(path)))
+        high = max(float(np.nanmax(np.abs(off))), 10 * LINEAR_UP_TO)
+        scale = Signed("away from the last [sigma]", -1.3 * high, 1.3 * high, LINEAR_UP_TO)
+        axis = named("round", list(map(str, range(len(path)))))
+        for k, members in enumerate(np.array_split(np.arange(len(names)), ceil(len(names) / len(JOINTS)))):  # a colour each
+            place = f"{at}/iterations/{model}/{k}_{part(names[members[0]])}_to_{part(names[members[-1]])}"
+            chart = Chart(stream, place, axis, scale, NARROW)
+            for color, p in zip(JOINTS, members, strict=False):
+                chart.line(names[p], rounds, off[:, p], color)
+                chart.marks(f"{names[p]} ", rounds, off[:, p], color)
 
 
 MAX_ROWS = 13  # Parameters of a single chart; more have a chart for each joint
@@ -56,7 +52,7 @@ ASIDE = 0.22  # How far the models of a parameter stand apart, of its room
 
 def send_parameters(stream: Stream, at: str, fit: Fit, number: int = 0) -> None:
     """Send every parameter's error, or its difference from the first model's, in % of its value; and the singular values."""
-    reference = _reference(fit)
+    reference = np.array(list(fit.truth.values())) if fit.truth else next(iter(fit.estimates.values())).X
     size = np.where(reference == 0, np.nan, np.abs(reference)) / 100
     off = {form: (estimate.X - reference) / size for form, estimate in fit.estimates.items()}
     reach = {form: SIGMAS * estimate.standard_errors / size for form, estimate in fit.estimates.items()}
@@ -85,11 +81,6 @@ def _parts(fit: Fit) -> Iterator[tuple[str, npt.NDArray[np.intp]]]:
     joints = np.array([fit.basis.parameters[p].joint or 0 for p in every])
     for j in np.unique(joints):
         yield fit.robot_model.robot.joints[j], every[joints == j]
-
-
-def _reference(fit: Fit) -> Array:
-    """Reference of the estimates: the truth, or the first of them."""
-    return np.array(list(fit.truth.values())) if fit.truth else next(iter(fit.estimates.values())).X
 
 
 def _scale(fit: Fit, farthest: Sequence[Array]) -> Linear:
