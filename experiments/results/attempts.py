@@ -81,9 +81,9 @@ class Attempts:
             folder = self._folder
             self.attempt(name, lambda: folder.add(name, make()))
 
-    def recording(self, make: "Callable[[], Streams]", into: ResultsFolder | None = None) -> None:
-        """Write the recording that `make` returns, beside the results or into another folder."""
-        self.attempt("the recording", lambda: write_streams(make(), into or self._folder))
+    def recording(self, make: "Callable[[], Streams]") -> None:
+        """Write the recording that `make` returns, beside the results."""
+        self.attempt("the recording", lambda: write_streams(make(), self._folder))
 
     def failed(self, what: str, why: str, traceback: str = "", error: BaseException | None = None) -> None:
         """Note that something failed, and why; of a fault its traceback."""
