@@ -110,18 +110,14 @@ class Follower:
             copy = Path(folder) / self.path.name
             copy.write_bytes(lines)
             try:
-                return read(copy, replace(self.options, delay=self._delay), self.request.robot_model).longest
+                delay = None if delay_method(self.options.delay) else self.options.delay  # an estimate comes at the end
+                return read(copy, replace(self.options, delay=delay), self.request.robot_model).longest
             except (ExperimentError, IdentificationError) as error:
                 complaint = str(error).replace(str(copy), str(self.path))
                 if lines.count(b"\n") > FEW and complaint != self._complaint:
                     self._complaint = complaint
                     sys.stderr.write(f"idbench: not yet: {complaint}\n")
                 return None
-
-    @property
-    def _delay(self) -> str | None:
-        """What is asked for, but for an estimate: that comes at the end."""
-        return None if delay_method(self.options.delay) else self.options.delay
 
     def _begun(self, log: MotionLog) -> "LiveIdentification":
         """Growing recording, begun with the first look."""
