@@ -118,7 +118,7 @@ class Base:
     fs : float
         Sampling frequency [Hz].
     roles : tuple of str
-        Arms that are drawn, of `arm.ROLES`.
+        Arms that are drawn, of `ROLES`.
     qd : Array, shape (time, joint)
         Velocities of the whole motion, planned or measured [rad/s]: they say which are slow.
     audience : Audience, optional

@@ -112,14 +112,12 @@ def charts(shelf: Shelf, name: str, pattern: str, width: float = WIDE, words: fl
     words : float
         Room that names beside the upright axis need more than numbers do, in heights of the frame.
     """
-    found = [frame.removesuffix("/frame") for frame in shelf.of(f"{pattern}/frame")]
-    return [_chart(shelf, name.format(*path.split("/")), path, width, words) for path in found]
-
-
-def _chart(shelf: Shelf, name: str, path: str, width: float, words: float) -> Part:
-    right = LEGEND if shelf.of(f"{path}/legend/*") else EDGE
-    bounds = rrb.VisualBounds2D(x_range=[-0.32 - words, width + right], y_range=[-0.17, HEIGHT + 0.36])
-    return rrb.Spatial2DView(origin=f"/{path}", name=name, visual_bounds=bounds)
+    views = list[Part]()
+    for path in (frame.removesuffix("/frame") for frame in shelf.of(f"{pattern}/frame")):
+        right = LEGEND if shelf.of(f"{path}/legend/*") else EDGE
+        bounds = rrb.VisualBounds2D(x_range=[-0.32 - words, width + right], y_range=[-0.17, HEIGHT + 0.36])
+        views.append(rrb.Spatial2DView(origin=f"/{path}", name=name.format(*path.split("/")), visual_bounds=bounds))
+    return views
 
 
 def keys(shelf: Shelf, *patterns: str) -> Part:
