@@ -25,9 +25,7 @@ def payload_table(ways: Mapping[str, PayloadEstimate], link: str) -> Listing:
         {name: concise(x, sigma) for name, x, sigma in zip(p.names, p.X.tolist(), p.sigma.tolist(), strict=True)}
         for p in ways.values()
     ]
-    rows = [
-        (name, UNITS.get(name, ""), *(values[name] for values in cells)) for name in next(iter(ways.values())).names
-    ]
+    rows = [(name, UNITS.get(name, ""), *(values[name] for values in cells)) for name in next(iter(ways.values())).names]
     return Listing(f"payload, about the origin of the frame of {link}", ("", "unit", *ways), tuple(rows), 2)
 
 

@@ -45,10 +45,11 @@ def ratio(cell: Cell, base: Cell) -> RatioRow:
         squares = [each.error[index][:, known] ** 2 for each, index in ((cell, mine), (base, theirs))]
         counts = np.random.default_rng(0).multinomial(len(mine), np.full(len(mine), 1 / len(mine)), size=DRAWS) / len(mine)
         # A product by einsum: its bits do not depend on the number of threads.
-        drawn, whole = (
+        drawn, middle = (
             np.subtract(*(ln_typical(np.einsum("...r,rp->...p", share, x)) for x in squares))
             for share in (counts, np.full(len(mine), 1 / len(mine)))
         )
+        whole = float(middle)
         low, high = np.exp(np.quantile(drawn, [(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2]))
     return {
         "settings": dict(cell.settings),
