@@ -221,7 +221,7 @@ def test_json_is_whole_whatever_fails(idbench, logs, monkeypatch):
 
 def test_runs_and_tables_keep_theirs(tmp_path, monkeypatch, capfd):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("idbench.experiments.recording.identification_recording.layer", broken)
+    monkeypatch.setattr("idbench.experiments.recording.identification_recording.Layer", broken)
     assert main(["run", "ideal", "--estimator", "OLS", "--out", "kept"]) == 2
     out, err = capfd.readouterr()
     assert "Cond(W)" in out

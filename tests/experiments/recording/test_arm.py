@@ -9,7 +9,7 @@ from idbench.experiments.recording.columns import time_columns
 from idbench.experiments.recording.motion_layer import Arm
 from idbench.experiments.recording.stream import Stream
 from idbench.sim.robot.robot import Robot
-from idbench.sim.robot.scene import motion, shapes
+from idbench.sim.robot.scene import Mover, shapes
 
 MJCF = """
 <mujoco>
@@ -67,7 +67,7 @@ def test_it_moves_and_is_recorded_under_names_without_signs(robot, reading, tmp_
     arm.move(time_columns(np.arange(3) / 100, 100.0), {"true": q, "planned": 0.5 * q})
     arm.trace(q)
     stream.write(tmp_path / "made.rrd")
-    moving = motion(robot, 0.5 * q)
+    moving = Mover(robot).at(0.5 * q)
     _, position = reading.column(tmp_path / "made.rrd", "world/planned/fore_arm", "Transform3D:translation")
     np.testing.assert_allclose(position, moving.positions["fore arm"], atol=1e-6)
     assert {"world/true/body1/geom1", "world/true/fore_arm/mesh"} <= reading.entities(tmp_path / "made.rrd")

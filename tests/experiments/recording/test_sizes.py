@@ -23,4 +23,4 @@ def test_titles_have_the_rms_of_what_was_sent_in_pieces():
 
 
 def test_what_is_said_of_several_logs_is_one_line():
-    assert of_each([("a", "x"), ("b", "y"), ("c", "x")]) == ["a, c: x", "b: y"]
+    assert list(of_each([("a", "x"), ("b", "y"), ("c", "x")]).values()) == ["a, c: x", "b: y"]
