@@ -42,11 +42,12 @@ def blamed() -> Iterator[None]:
         raise PluginError(f"plug-in {frame.name} raised {message} ({frame.filename}, line {frame.lineno})") from error
 
 
-def expect_kind(plugin: object, method: str, value: object, kind: type[T]) -> T:
+def expect_kind(plugin: object, method: str, value: T, kind: type) -> T:
     """Result of a plug-in's method, if it is of a kind; raise PluginError otherwise."""
     if isinstance(value, kind):
         return value
-    raise PluginError(f"plug-in {type(plugin).__name__}.{method} returned {value!r:.60}, expected {kind.__name__}")
+    article = "an" if kind.__name__[0] in "AEIOU" else "a"
+    raise PluginError(f"plug-in {type(plugin).__name__}.{method} returned {value!r:.60}, expected {article} {kind.__name__}")
 
 
 def expect(plugin: object, method: str, value: object, *shapes: Sequence[int]) -> Array:

@@ -14,7 +14,6 @@ from idbench.experiments.identification.job import (
     chooses_band,
     fit_of,
     identified,
-    read_options,
     request_of,
     robot_of,
     truth_of,
@@ -95,7 +94,7 @@ def read_log(
     asked = request_from(LogRequest, table, "read_log", taken=taken)
     if sought := delay_method(asked.torque_delay):
         raise ExperimentError(f"torque_delay: the robot is needed for it: idbench.fit(..., torque_delay={sought!r})")
-    return motion_log(file_of(Path(path)), read_options(asked), robot)
+    return motion_log(file_of(Path(path)), asked, robot)
 
 
 def fit(
@@ -154,7 +153,7 @@ def fit(
     loaded = prepared(_read(logs, asked, model), request, sought=sought, band=chooses_band(asked))
     known = truth if truth is not None or not _files(logs) else truth_of(asked, request)
     if held_out and _files(held_out):
-        found = with_held_out(loaded, asked.validate, read_options(asked), known)
+        found = with_held_out(loaded, asked, known)
     else:
         others = _read(held_out, asked, model)
         others = [late(each, loaded.read[0].channel) for each in others] if sought else others
@@ -269,8 +268,7 @@ def _with_keys(model: RobotModel, asked: jobs.IdentifyRequest, table: Mapping[st
 
 def _read(logs: Sequence[AnyLog], asked: jobs.IdentifyRequest, model: RobotModel) -> list[ReadLog]:
     """Return logs, those of Python as if they had been read."""
-    options = read_options(asked)
     return [
-        given_log(f"log {k + 1}", log, model) if isinstance(log, MotionLog) else read(file_of(Path(log)), options, model)
+        given_log(f"log {k + 1}", log, model) if isinstance(log, MotionLog) else read(file_of(Path(log)), asked, model)
         for k, log in enumerate(logs)
     ]

@@ -4,13 +4,14 @@ from dataclasses import replace
 from pathlib import Path
 
 from idbench.experiments.errors import ExperimentError
-from idbench.experiments.identification.reading import ReadLog, ReadOptions, read
+from idbench.experiments.identification.reading import ReadLog, read
 from idbench.experiments.identification.robot_model import RobotModel
+from idbench.experiments.requests.shared import LogRequest
 from idbench.identify import LogError, MotionLog
 from idbench.identify.data.log_columns import LogColumns
 
 
-def motion_log(path: Path, options: ReadOptions, robot_model: RobotModel | None = None) -> MotionLog:
+def motion_log(path: Path, options: LogRequest, robot_model: RobotModel | None = None) -> MotionLog:
     """Return the log of a file, with the names of its joints; raise ExperimentError if it has several pieces."""
     found = read(path, options, robot_model)
     if len(found.logs) > 1:

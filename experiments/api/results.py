@@ -15,12 +15,13 @@ from idbench.experiments.exports.exports import EXPORTS
 from idbench.experiments.identification.fit import Fit
 from idbench.experiments.identification.job import summary_of
 from idbench.experiments.identification.load import within
-from idbench.experiments.identification.reading import ReadOptions, late, read
+from idbench.experiments.identification.reading import late, read
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.judgement.held_out import Verdict
 from idbench.experiments.judgement.judgement import Judgement, judge
 from idbench.experiments.judgement.remedies import checks
 from idbench.experiments.reports.estimates import conclusion
+from idbench.experiments.requests.shared import LogRequest
 from idbench.experiments.results.attempts import Attempts
 from idbench.experiments.results.writing import folder_for, write_text
 from idbench.experiments.text import relative
@@ -188,7 +189,7 @@ class Identification:
         robot, estimate = self.robot, self._of(model)
         if isinstance(log, str | Path):
             known = replace(self.fit.logs.fitted[0].torque, gain=1.0)  # as for `held_out`; a gain is of its own file
-            log = read(Path(log), ReadOptions(fallback=known), robot).longest
+            log = read(Path(log), LogRequest(), robot, known).longest
         if not isinstance(log, MotionLog):
             raise ExperimentError(f"score: {log!r:.60} is no log: give a file, or a MotionLog as read_log returns it")
         given = given_log("the held-out log", log, robot)

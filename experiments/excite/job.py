@@ -9,9 +9,10 @@ from idbench.experiments.excite.design import Design
 from idbench.experiments.excite.excited import Excited
 from idbench.experiments.excite.sequence import MotionSequence
 from idbench.experiments.identification.known import number_of
-from idbench.experiments.identification.reading import ReadOptions, file_of, read
+from idbench.experiments.identification.reading import file_of, read
 from idbench.experiments.identification.robot_model import RobotModel, absolute
 from idbench.experiments.requests.jobs import ExciteRequest
+from idbench.experiments.requests.shared import LogRequest
 from idbench.identify import MotionLog, TorqueChannel
 from idbench.sim.encoders import IncrementalEncoder
 from idbench.sim.limits.motion_limits import MotionLimits, limits_of
@@ -144,4 +145,4 @@ def _percent(text: str | None) -> float | None:
 
 def _log(path: Path, robot_model: RobotModel) -> MotionLog:
     """Return an earlier log: of its torques nothing counts, so that their meaning is not asked for."""
-    return read(file_of(path), ReadOptions(fallback=TorqueChannel("held")), robot_model).longest
+    return read(file_of(path), LogRequest(), robot_model, TorqueChannel("held")).longest

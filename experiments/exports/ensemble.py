@@ -13,6 +13,7 @@ from idbench.experiments.identification.fit import Fit
 from idbench.experiments.judgement.held_out import HeldOut, on_log
 from idbench.experiments.note import Note
 from idbench.identify import Array, Estimate, IdentificationError, MotionLog
+from idbench.identify.arrays import TINY
 from idbench.identify.telling import stage
 from idbench.sim.engine.driven import shoot
 from idbench.sim.errors import BenchError
@@ -166,7 +167,7 @@ class Ensemble:
     def _drawn(self, draws: int, spread: float, rng: np.random.Generator) -> dict[str, Array]:
         """Return consistent robots about the estimate, `spread` times its standard errors away."""
         estimate, robot_model = self.estimate, self.fit.robot_model
-        sigma = np.sqrt(np.maximum(np.diagonal(estimate.covariance), 1e-300))
+        sigma = np.sqrt(np.maximum(np.diagonal(estimate.covariance), TINY))
         values, vectors = np.linalg.eigh(estimate.covariance / np.outer(sigma, sigma))
         root = sigma[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
         deviations = spread * np.matmul(root, rng.standard_normal((draws, len(root)))[..., None])[..., 0]

@@ -11,6 +11,7 @@ from idbench.experiments.exports.ensemble import DRAWS, LENGTH, Ensemble, FreeRu
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.reports.panels import Panel, stacked
 from idbench.identify import Array
+from idbench.identify.arrays import TINY
 
 PICTURE = "_band.svg"  # Ending of the name of the picture of the band
 QUANTILES = {"low": 0.025, "middle": 0.5, "high": 0.975}
@@ -74,7 +75,7 @@ def ranges(ensemble: Ensemble) -> dict[str, Any]:
         own |= {f"inertia_{i + 1}": fields["body_inertia"][:, k, i] for i in range(3)}
         columns |= {f"{body}.{name}": x for name, x in own.items()}
         bodies[body] = {name: _told(x) for name, x in own.items()}
-    varied = {name: x for name, x in columns.items() if np.ptp(x) > 1e-9 * np.abs(x).max(initial=1e-300)}
+    varied = {name: x for name, x in columns.items() if np.ptp(x) > 1e-9 * np.abs(x).max(initial=TINY)}
     matrix = np.atleast_2d(np.corrcoef(np.stack(list(varied.values())))) if varied else np.empty((0, 0))
     return {
         "about": (

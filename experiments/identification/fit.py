@@ -22,6 +22,7 @@ from idbench.identify import (
     Problem,
     encoder_steps,
 )
+from idbench.identify.arrays import TINY
 from idbench.identify.judge.diagnosis import diagnosed
 from idbench.identify.judge.friction_choice import FrictionChoice
 from idbench.identify.judge.suspect import Suspect
@@ -153,7 +154,7 @@ class Fit:
         if not self.problem.long:
             rows = self.problem.rows
             squares = squares - np.sum(rows.by_kind(rows.Y), axis=-1) ** 2 / np.maximum(rows.count, 1)
-        factors, some = self.problem.factors, squares > NOTHING * np.maximum(self._torque_squares, 1e-300)
+        factors, some = self.problem.factors, squares > NOTHING * np.maximum(self._torque_squares, TINY)
         share = np.divide(1.0, squares, out=np.full(len(squares), np.nan), where=some)
         return {name: 1 - factors.squares(e.X) * share for name, e in self.estimates.items()}
 
@@ -162,7 +163,7 @@ class Fit:
         """Error due to noise of the torque predicted on the own log, over that torque's rms, shape (joint,), by model."""
         W = self.problem.factors.R[..., :-1]
         spread = {name: np.sum(W @ e.noise_covariance * W, axis=(-2, -1)) for name, e in self.estimates.items()}
-        squares = np.maximum(self._torque_squares, 1e-300)
+        squares = np.maximum(self._torque_squares, TINY)
         return {name: np.sqrt(np.maximum(found, 0.0) / squares) for name, found in spread.items()}
 
     @cached_property

@@ -16,11 +16,11 @@ from idbench.experiments.identification.load import Loaded, in_band, load, with_
 from idbench.experiments.identification.log_warnings import unchanging, warnings_of_log
 from idbench.experiments.identification.logs import Logs
 from idbench.experiments.identification.rates import CONTROLLER
-from idbench.experiments.identification.reading import ReadOptions, file_of, stated_by
+from idbench.experiments.identification.reading import file_of, stated_by
 from idbench.experiments.identification.request import Request
 from idbench.experiments.identification.robot_model import SCARA, RobotModel, absolute
 from idbench.experiments.requests.jobs import IdentifyRequest
-from idbench.experiments.requests.shared import CHAIN, LogRequest
+from idbench.experiments.requests.shared import CHAIN
 from idbench.identify import ESTIMATORS, MODELS, IdentificationError
 from idbench.identify.models import THREE
 from idbench.identify.signals.masks import NoMask
@@ -36,11 +36,6 @@ def identified(asked: IdentifyRequest) -> Fit:
         If something is wrong with the request, its files, or the logs.
     """
     return fit_of(*loaded_logs(asked, request_of(asked)))
-
-
-def read_options(asked: LogRequest) -> ReadOptions:
-    """How logs are read, by the request."""
-    return ReadOptions(asked.torque, asked.torque_delay, asked.unwrap, columns=asked.reading)
 
 
 def request_of(asked: IdentifyRequest, robot_model: RobotModel | None = None) -> Request:
@@ -90,13 +85,13 @@ def assumes_the_robot(asked: IdentifyRequest) -> bool:
 
 def read_logs(asked: IdentifyRequest, request: Request) -> Loaded:
     """Return the logs of the fit, and the request with the band that suits them."""
-    return load(asked.log, read_options(asked), request, band=chooses_band(asked))
+    return load(asked.log, asked, request, band=chooses_band(asked))
 
 
 def loaded_logs(asked: IdentifyRequest, request: Request) -> tuple[Request, Logs]:
     """Return the request with the band that suits the logs, and the logs, those that are held out among them."""
     loaded = read_logs(asked, request)
-    return loaded.request, with_held_out(loaded, asked.validate, read_options(asked), truth_of(asked, request))
+    return loaded.request, with_held_out(loaded, asked, truth_of(asked, request))
 
 
 def fit_of(request: Request, logs: Logs) -> Fit:

@@ -12,9 +12,11 @@ from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.chain_settings import with_cutoff
 from idbench.experiments.identification.logs import Logs, delay_method
 from idbench.experiments.identification.poses import of_poses
-from idbench.experiments.identification.reading import ReadLog, ReadOptions, file_of, late, read, read_as, with_delays
+from idbench.experiments.identification.reading import ReadLog, file_of, late, read, read_as, with_delays
 from idbench.experiments.identification.request import Request
 from idbench.experiments.identification.robot_model import RobotModel
+from idbench.experiments.requests.jobs import IdentifyRequest
+from idbench.experiments.requests.shared import LogRequest
 from idbench.experiments.text import of_each
 from idbench.identify import Array, CentralDifference, ExplicitModel, IdentificationError, LogError, MotionLog, instants
 from idbench.identify.judge.band import Band
@@ -149,7 +151,7 @@ def _names(every: Sequence[ReadLog]) -> list[str]:
 
 
 def load(
-    paths: Sequence[Path], options: ReadOptions, request: Request, *, band: bool, more: int = 0, alike: int | None = None
+    paths: Sequence[Path], options: LogRequest, request: Request, *, band: bool, more: int = 0, alike: int | None = None
 ) -> Loaded:
     """Return logs of one fit.
 
@@ -157,7 +159,7 @@ def load(
     ----------
     paths : sequence of Path
         Their files, or folders of runs.
-    options : ReadOptions
+    options : LogRequest
         How they are read.
     request : Request
         What is asked for.
@@ -171,7 +173,7 @@ def load(
     require_different(paths)
     with stage("reading logs"):
         every = [read(file_of(path), options, request.robot_model) for path in paths]
-    return prepared(every, request, sought=delay_method(options.delay), band=band, more=more, alike=alike)
+    return prepared(every, request, sought=delay_method(options.torque_delay), band=band, more=more, alike=alike)
 
 
 def prepared(
@@ -207,19 +209,18 @@ def in_band(request: Request, cutoff: float) -> Request:
     return replace(request, method=(with_cutoff(request.processing, cutoff), request.solver))
 
 
-def with_held_out(loaded: Loaded, paths: Sequence[Path], options: ReadOptions, truth: Mapping[str, float] | None) -> Logs:
+def with_held_out(loaded: Loaded, asked: IdentifyRequest, truth: Mapping[str, float] | None) -> Logs:
     """Return logs of a fit with those on which it is judged.
 
     Where nothing says what the torques of these mean, it is what those of the first log do.
     """
     known = loaded.read[0].channel  # as it was logged; its gain is of its own file
-    sought, every = delay_method(options.delay), dict[str, ReadLog]()
-    options = replace(options, fallback=replace(known, gain=1.0))
-    require_different(paths)
-    for given in paths:
+    sought, every = delay_method(asked.torque_delay), dict[str, ReadLog]()
+    require_different(asked.validate)
+    for given in asked.validate:
         path = file_of(given)
         try:
-            one = read_as(loaded.read[0].path, path, options, loaded.request.robot_model)
+            one = read_as(loaded.read[0].path, path, asked, loaded.request.robot_model, replace(known, gain=1.0))
             every[str(given)] = late(one, known) if sought else one
         except (LogError, ExperimentError) as error:
             words = f"--validate {error}" if str(path) in str(error) else f"--validate {path}: {error}"

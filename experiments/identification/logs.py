@@ -36,11 +36,6 @@ class LogFacts:
         """Its longest piece."""
         return max(self.repaired.logs, key=lambda log: log.samples)
 
-    @property
-    def joints(self) -> tuple[str, ...]:
-        """Names of the joints, or their numbers."""
-        return self.columns.joints or tuple(f"joint {j + 1}" for j in range(self.columns.n))
-
     @cached_property
     def velocities(self) -> Array:
         """Differences of the positions, shape (time, joint)."""
@@ -63,17 +58,17 @@ class LogFacts:
                 "torque_noise": float(noises[1][j]),
                 "encoder_step": None if np.isnan(steps[j]) else float(steps[j]),
             }
-            for j, joint in enumerate(self.joints)
+            for j, joint in enumerate(self.columns.names)
         ]
 
     def notes(self) -> Iterator[str]:
         """Yield what is worth knowing of the whole log."""
-        yield from self.repaired.words(self.joints)
+        yield from self.repaired.words(self.columns.names)
         yield f"torques exceed their noise up to {content_end(self.log):.3g} Hz"
         absent = self.columns.missing
         dead = [row["joint"] for j, row in enumerate(self.rows) if row["tau"][0] == row["tau"][1] and j not in absent]
         if absent:
-            yield f"there is no torque of {', '.join(self.joints[j] for j in absent)}: a fit leaves its rows out"
+            yield f"there is no torque of {', '.join(self.columns.names[j] for j in absent)}: a fit leaves its rows out"
         if dead:
             yield f"the torque of {', '.join(dead)} never changes: is it logged?"
         still = [row["joint"] for row in self.rows if row["q"][0] == row["q"][1]]

@@ -16,7 +16,7 @@ from idbench.experiments.identification.request import Request
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.note import Note
 from idbench.experiments.program import program
-from idbench.experiments.requests.shared import ColumnOptions
+from idbench.experiments.requests.shared import ColumnOptions, LogRequest
 from idbench.experiments.requests.words import Meaning
 from idbench.identify import Array, AsLogged, LogError, MotionLog, RangeError, SettingError, TimeError, TorqueChannel
 from idbench.identify.data.log_columns import LogColumns
@@ -56,22 +56,6 @@ def stated_by(log: Path) -> dict[str, Any]:
         raise ExperimentError(f"{path} is no summary of a run ({error}): name the log itself, {log / 'log.parquet'}") from error
 
 
-@dataclass(frozen=True)
-class ReadOptions:
-    """How a log is read."""
-
-    torque: Meaning | None = None
-    """What a torque sample means, where options say it."""
-    delay: str | None = None
-    """Delay of the torque [s], or which of `DELAYS` is to be found, where options say it."""
-    unwrap: bool = False
-    """Whether 2 pi jumps of the angles are undone."""
-    fallback: TorqueChannel | None = None
-    """What its torque means where the file says nothing."""
-    columns: ColumnOptions = ColumnOptions()  # noqa: RUF009  # frozen
-    """What the columns are, as options say."""
-
-
 @dataclass(frozen=True, eq=False)
 class ReadLog:
     """A log as it was read."""
@@ -95,22 +79,22 @@ class ReadLog:
         return max(self.logs, key=lambda log: log.samples)
 
 
-def read(path: Path, options: ReadOptions, robot_model: RobotModel | None) -> ReadLog:
+def read(path: Path, options: LogRequest, robot_model: RobotModel | None, fallback: TorqueChannel | None = None) -> ReadLog:
     """Return the log, its torque read as the options say; its delay is that which is stated.
 
-    Joints are in the order of the robot; without one in that of the file.
+    Joints are in the order of the robot; without one in that of the file. `fallback` is what its torque means where neither
+    the file nor options say it.
     """
-    columns, before = _ordered(path, columns_of(path, options.columns), robot_model)
-    names = columns.joints if robot_model is None else robot_model.robot.joints
-    names = names or tuple(f"joint {j + 1}" for j in range(columns.n))
+    columns, before = _ordered(path, columns_of(path, options.reading), robot_model)
+    names = columns.names if robot_model is None else robot_model.robot.joints
     hinges = [True] * columns.n if robot_model is None else [joint.kind == "hinge" for joint in robot_model.tree.joints]
-    stated = columns.torque or options.fallback
-    channel = channel_of(stated, _meaning(path, options, stated), options.delay)
-    poses = are_poses(path, columns, stated=options.columns.poses)
+    stated = columns.torque or fallback
+    channel = channel_of(stated, _meaning(path, options, stated), options.torque_delay)
+    poses = are_poses(path, columns, stated=options.reading.poses)
     if not np.any(columns.tau) and np.ptp(columns.q, axis=0).any():
         raise ExperimentError(f"{path}: all torques are 0: there is nothing to identify")
     columns = replace(columns, q=_turned(path, columns.q, names, hinges, options.unwrap))
-    assumed = options.delay is None and stated is None and not options.columns.simulated
+    assumed = options.torque_delay is None and stated is None and not options.reading.simulated
     notes = [columns.said] if columns.said else []
     absent = ", ".join(names[j] for j in columns.missing)
     notes += [f"the log has no torque of {absent}: its rows are left out, and what only they would show"] if absent else []
@@ -120,10 +104,10 @@ def read(path: Path, options: ReadOptions, robot_model: RobotModel | None) -> Re
         log, said = poses_of(columns, channel)
         return ReadLog(path, (log,), columns, channel, (*notes, said))
     notes += ["no --torque-delay was given, 0 is assumed: `estimate` finds it"] if assumed else []
-    if options.columns.resample or columns.t_tau is not None:
+    if options.reading.resample or columns.t_tau is not None:
         repaired = Repaired.of(columns, channel)
         words = (*repaired.words(names), *notes)
-        return ReadLog(path, repaired.logs, columns, channel, words, options.columns.simulated)
+        return ReadLog(path, repaired.logs, columns, channel, words, options.reading.simulated)
     try:
         log = MotionLog.at_times(columns.t, columns.q, columns.tau, channel, columns.conditions, columns.missing)
     except TimeError as error:
@@ -132,7 +116,7 @@ def read(path: Path, options: ReadOptions, robot_model: RobotModel | None) -> Re
             f"{path}: {error}: add --resample, or write it anew and look: {program()} resample {shlex.quote(str(path))} "
             f"--torque {channel.meaning}{late} --out uniform.parquet"
         ) from error
-    return ReadLog(path, (log,), columns, channel, tuple(notes), options.columns.simulated)
+    return ReadLog(path, (log,), columns, channel, tuple(notes), options.reading.simulated)
 
 
 def _ordered(path: Path, columns: LogColumns, robot_model: RobotModel | None) -> tuple[LogColumns, str]:
@@ -149,14 +133,14 @@ def _ordered(path: Path, columns: LogColumns, robot_model: RobotModel | None) ->
         ) from error
 
 
-def _meaning(path: Path, options: ReadOptions, stated: TorqueChannel | None) -> Meaning:
+def _meaning(path: Path, options: LogRequest, stated: TorqueChannel | None) -> Meaning:
     """Meaning of a log's torque; raise ExperimentError if nobody states it."""
-    if options.columns.simulated and options.torque not in (None, "instantaneous"):
+    if options.reading.simulated and options.torque not in (None, "instantaneous"):
         raise ExperimentError(
             f"--simulated --torque {options.torque}: torques of MuJoCo are instantaneous, beside the positions about which it "
             "steps: leave --torque out"
         )
-    meaning = options.torque or (stated.meaning if stated else "instantaneous" if options.columns.simulated else None)
+    meaning = options.torque or (stated.meaning if stated else "instantaneous" if options.reading.simulated else None)
     if meaning is None:
         raise ExperimentError(
             f"{path} does not say what its torque means: add --torque held (a controller's command), instantaneous (a "
@@ -166,19 +150,21 @@ def _meaning(path: Path, options: ReadOptions, stated: TorqueChannel | None) -> 
     return meaning
 
 
-def read_as(first: Path, path: Path, options: ReadOptions, robot_model: RobotModel | None) -> ReadLog:
+def read_as(
+    first: Path, path: Path, options: LogRequest, robot_model: RobotModel | None, fallback: TorqueChannel | None = None
+) -> ReadLog:
     """Return a log, its columns as the file beside another log says where none is beside this one.
 
     Logs that idbench wrote say it themselves; so do those that do not have the columns of the other.
     """
     beside = LogLayout.beside(first)
     itself = path.suffix.lower() == LAYOUT_FILE or LogLayout.beside(path) is not None
-    if beside is None or beside[0].files or options.columns.stated or itself or read_table(path).torque is not None:
-        return read(path, options, robot_model)
+    if beside is None or beside[0].files or options.reading.stated or itself or read_table(path).torque is not None:
+        return read(path, options, robot_model, fallback)
     try:
-        found = read(path, replace(options, columns=replace(options.columns, layout=beside[1])), robot_model)
+        found = read(path, replace(options, reading=replace(options.reading, layout=beside[1])), robot_model, fallback)
     except (LogError, ExperimentError):
-        return read(path, options, robot_model)
+        return read(path, options, robot_model, fallback)
     return replace(found, notes=(f"columns are what {beside[1].name} beside {first.name} says", *found.notes))
 
 

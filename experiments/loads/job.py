@@ -15,7 +15,6 @@ from rich.text import Text
 from idbench.experiments.document import Document, Listing
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.friction_choice import chosen_friction, words
-from idbench.experiments.identification.job import read_options
 from idbench.experiments.identification.load import in_band, load
 from idbench.experiments.identification.request import Request
 from idbench.experiments.identification.robot_model import RobotModel, absolute
@@ -184,7 +183,7 @@ def _loaded(asked: LoadRequest) -> tuple[LoadJudgement, tuple[str, ...]]:
         request = in_band(request, asked.cutoff)
     paths, band = (*asked.unloaded, *asked.log), asked.cutoff is None
     first = len(asked.unloaded)
-    loaded = load(paths, read_options(asked), request, band=band, more=len(LETTERS), alike=first or None)
+    loaded = load(paths, asked, request, band=band, more=len(LETTERS), alike=first or None)
     request = loaded.request
     notes = list(loaded.notes)
     without, with_it = loaded.logs(slice(first)), loaded.logs(slice(first, None))

@@ -15,6 +15,7 @@ from idbench.experiments.errors import ExperimentError, ResultsError
 from idbench.experiments.recording.columns import part
 from idbench.experiments.text import with_unit
 from idbench.identify import Array, LogError, MotionLog
+from idbench.identify.arrays import TINY
 from idbench.identify.files.log_file import read_log
 from idbench.identify.tables import concise
 
@@ -88,7 +89,7 @@ def shift_of(first: MotionLog, other: MotionLog) -> float | None:
     v = [np.gradient(np.stack([np.interp(np.arange(0, log.t[-1], 1 / fs), log.t, q) for q in log.q.T]), axis=1) * fs
          for log in (first, other)]  # fmt: skip
     correlation = np.sum([scipy.signal.correlate(a, b) for a, b in zip(*v, strict=True)], axis=0)
-    correlation /= max(float(np.sqrt(np.prod([np.sum(x**2) for x in v]))), 1e-300)
+    correlation /= max(float(np.sqrt(np.prod([np.sum(x**2) for x in v]))), TINY)
     lags = scipy.signal.correlation_lags(v[0].shape[1], v[1].shape[1])
     best, still = int(np.argmax(correlation)), int(np.flatnonzero(lags == 0)[0])
     if correlation[best] < SAME_MOTION:
@@ -125,7 +126,7 @@ def estimates(runs: Sequence[Compared]) -> str:
     rows = []
     for name in names:
         X, sigma = zip(*(of[name] for of in found), strict=True)
-        off = (X[-1] - X[0]) / max(float(np.hypot(sigma[0], sigma[-1])), 1e-300)
+        off = (X[-1] - X[0]) / max(float(np.hypot(sigma[0], sigma[-1])), TINY)
         marked = f"**{off:+.1f}**" if abs(off) > CLEAR else f"{off:+.1f}"
         true = f"{truth[name]:g}" if name in truth else ""
         label = with_unit(name, units.get(name, ""))

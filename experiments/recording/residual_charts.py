@@ -127,7 +127,7 @@ class ResidualCharts:
 
     def send(self) -> None:
         """Send them all."""
-        left = residual_instants(self.fit)
+        left = residual_instants(self.fit, self.fit.estimates)
         joined = of_joints(self.fit, left)
         for j in range(len(self.joints)) if joined else ():
             self._over("over_velocity", j, joined)

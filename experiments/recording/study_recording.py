@@ -17,8 +17,9 @@ from idbench.experiments.recording.folder import BASE
 from idbench.experiments.recording.layouts import tabs
 from idbench.experiments.recording.scales import Words, decades, linear, named
 from idbench.experiments.recording.stream import Stream
-from idbench.experiments.study.answer import answer, short, value, where
+from idbench.experiments.study.answer import short, value, where
 from idbench.experiments.study.axis import Axis
+from idbench.experiments.study.ratios import study_answer
 from idbench.experiments.study.statistics import MIN_ERROR, Cell
 from idbench.experiments.study.study import Study
 from idbench.experiments.study.worst_runs import command, worst_runs
@@ -239,4 +240,4 @@ def _send_sigmas(stream: Stream, cells: Sequence[Cell]) -> None:
 
 def _text(study: Study, cells: Sequence[Cell], worst: Sequence[Worst]) -> str:
     lines = [f"- {name} {100 * e:+.2g} %: {where(cell, cells)}\n  `{again}`" for cell, name, e, _, again in worst[:LISTED]]
-    return "\n\n".join([f"# {study.question}", answer(cells, study.edges), TYPICAL, "## Worst runs", "\n".join(lines)])
+    return "\n\n".join([f"# {study.question}", study_answer(study, cells), TYPICAL, "## Worst runs", "\n".join(lines)])

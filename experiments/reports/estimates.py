@@ -15,7 +15,7 @@ from idbench.experiments.judgement.warnings import DELAY, FLAGS, LOG, doubtful, 
 from idbench.experiments.note import noted
 from idbench.experiments.text import WORTHLESS, error_percentage, number, percent, relative, with_unit
 from idbench.identify import Estimate
-from idbench.identify.arrays import Array
+from idbench.identify.arrays import TINY, Array
 from idbench.identify.tables import concise
 
 
@@ -130,7 +130,7 @@ def models_apart(fit: Fit) -> tuple[str, ...]:
 def _sigmas_apart(fit: Fit, model: str, other: str) -> float:
     """Largest difference between the estimates of two models [sigma]; infinity where one is not known."""
     one, two = fit.estimates[model], fit.estimates[other]
-    sigma = np.maximum(np.hypot(one.standard_errors, two.standard_errors), 1e-300)
+    sigma = np.maximum(np.hypot(one.standard_errors, two.standard_errors), TINY)
     return float(np.max(np.nan_to_num(np.abs(one.X - two.X) / sigma, nan=np.inf)))
 
 

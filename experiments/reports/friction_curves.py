@@ -1,6 +1,6 @@
 """Friction over velocity: as measured, and as the laws have it."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -35,12 +35,12 @@ class Spectrum:
     """Of what each model leaves, and of the noise of torques and of positions, shape (frequency,) each."""
 
 
-def residual_instants(fit: Fit) -> dict[str, Instants]:
-    """Return the residuals of each model's equations, at every sample of the first log."""
+def residual_instants(fit: Fit, forms: Iterable[str]) -> dict[str, Instants]:
+    """Return the residuals of the equations of models, at every sample of the first log."""
     signals = fit.problem.signals[0]
     basis = fit.basis
     chain = fit.processing
-    return {form: instants(signals, basis, MODELS.create(form), chain, e.X) for form, e in fit.estimates.items()}
+    return {form: instants(signals, basis, MODELS.create(form), chain, fit.estimates[form].X) for form in forms}
 
 
 def of_joints(fit: Fit, left: Mapping[str, Instants]) -> dict[str, Instants]:

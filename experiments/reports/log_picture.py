@@ -20,7 +20,7 @@ def figure_of(facts: LogFacts) -> Figure:
     panels = [figure.add_subplot(grid[row, :]) for row in range(3)]
     shown = (("q [rad]", log.q), ("qd [rad/s]", facts.velocities), ("torque [N m]", log.tau))
     for panel, (name, values) in zip(panels, shown, strict=True):
-        for j, joint in enumerate(facts.joints):
+        for j, joint in enumerate(facts.columns.names):
             panel.plot(log.t[::step], values[::step, j], color=_color(j), lw=0.8, label=joint)
         panel.set_ylabel(name)
     panels[-1].set_xlabel("time [s]")

@@ -8,6 +8,7 @@ import numpy as np
 
 from idbench.experiments.text import decade_values, round_values
 from idbench.identify import Array
+from idbench.identify.arrays import TINY
 
 WIDTH = 520.0  # Of a panel [px]: two beside each other on a page, one on a telephone
 ROW = 96.0  # An inch of a panel's height [px]
@@ -34,7 +35,7 @@ class PanelAxis:
 
     def scaled(self, x: Array) -> Array:
         """Places of values on an even axis."""
-        return np.log10(np.maximum(x, 1e-300)) if self.log else np.asarray(x, dtype=np.float64)
+        return np.log10(np.maximum(x, TINY)) if self.log else np.asarray(x, dtype=np.float64)
 
     def ends(self, every: Sequence[Array]) -> tuple[float, float]:
         """Return its ends, for data."""

@@ -6,6 +6,7 @@ import numpy as np
 
 from idbench.experiments.identification.fit import Fit
 from idbench.identify import Estimate
+from idbench.identify.arrays import TINY
 
 STRONG = 0.9  # Correlation above which two parameters are named: a change of one is then hardly told from one of the other
 
@@ -28,7 +29,7 @@ def words_of_uncertainty(fit: Fit) -> Iterator[str]:
         each = [f"{a} and {b} ({r:+.2f})" if b != DELAY else f"{a} and {b} ({r:.2f}, of its size)" for a, b, r in pairs[:NAMED]]
         yield f"strongly correlated: {', '.join(each)}{_more(len(pairs))}"
     if estimate.between_logs is not None:
-        share = np.sqrt(estimate.between_logs.variance) / np.maximum(np.abs(estimate.X), 1e-300)
+        share = np.sqrt(estimate.between_logs.variance) / np.maximum(np.abs(estimate.X), TINY)
         order = [
             k for k in np.argsort(-share) if share[k] > DISTINCT and abs(estimate.X[k]) > SHOWN * estimate.standard_errors[k]
         ]
@@ -45,7 +46,7 @@ def error_shares(estimate: Estimate) -> Iterator[tuple[str, float, str, float]]:
 
     var X = noise + delay + model + what changes from log to log
     """
-    total = np.maximum(estimate.standard_errors**2, 1e-300)
+    total = np.maximum(estimate.standard_errors**2, TINY)
     delay, error = np.diagonal(estimate.delay_covariance), estimate.model_error
     parts = {"noise of the logs": estimate.noise_sigma**2 - delay, "delay of the torques": delay}
     if error is not None:
@@ -62,7 +63,7 @@ def error_shares(estimate: Estimate) -> Iterator[tuple[str, float, str, float]]:
 def correlated(estimate: Estimate) -> list[tuple[str, str, float]]:
     """Return the pairs of parameters, or of a parameter and the delay, that are strongly correlated, the strongest first."""
     C = estimate.within_covariance
-    sigma = np.sqrt(np.maximum(np.diagonal(C), 1e-300))
+    sigma = np.sqrt(np.maximum(np.diagonal(C), TINY))
     R = C / np.outer(sigma, sigma)
     of_functions = [p.is_random_effect for p in estimate.problem.basis.parameters]
     R[of_functions], R[:, of_functions] = 0.0, 0.0

@@ -2,14 +2,18 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
-from idbench.experiments.study.answer import combination
+from idbench.experiments.study.answer import answer, combination, failures
 from idbench.experiments.study.comparison import ln_typical
 from idbench.experiments.study.statistics import CONFIDENCE, Cell
 from idbench.experiments.text import new_table
+from idbench.identify.models import THREE
+
+if TYPE_CHECKING:
+    from idbench.experiments.study.study import Study
 
 DRAWS = 2000  # Of a bootstrap: the ends of an interval are then known to some 3 % of its width
 
@@ -129,3 +133,20 @@ def pair_of(row: RatioRow) -> str:
 def interval(row: RatioRow) -> str:
     """Return a ratio with its interval, in words."""
     return f"{row['ratio']:.2g} ({row['low']:.2g} to {row['high']:.2g})"
+
+
+def study_answer(study: "Study", found: Sequence[Cell]) -> str:
+    """Return the answer of a study: the ratios of the models' errors, or which method errs least."""
+    if not (compares_models(study) and any(cell.runs for cell in found)):
+        return answer(found, study.edges)
+    parts = conclusion([row for _, row in ratios(found)]), failures(found)
+    return " ".join(filter(None, parts)) or answer(found, study.edges)
+
+
+def compares_models(study: "Study") -> bool:
+    """True if a study compares the models over kinds of noise, by equal numbers of rows.
+
+    It has too many methods for a test of every pair: the draws of a permutation test grow with the number of pairs.
+    """
+    noises = any(axis.field == "noise" for axis in study.axes)
+    return study.rows == "equal" and set(THREE) <= set(study.models) and "GLS" in study.estimators and noises

@@ -17,8 +17,6 @@ from idbench.experiments.results.attempts import Attempts
 from idbench.experiments.results.folder import ResultsFolder
 from idbench.experiments.results.writing import write_summary
 from idbench.experiments.study.answer import (
-    answer,
-    failures,
     grouped,
     headline,
     method,
@@ -32,14 +30,13 @@ from idbench.experiments.study.axis import FRICTION, Axis
 from idbench.experiments.study.cluster import versions
 from idbench.experiments.study.comparison import differences
 from idbench.experiments.study.figures import bars_figure, cost_figure, coverage_figure, error_figure, typical_figure
-from idbench.experiments.study.ratios import conclusion, interval, pair_of, ratios, ratios_table
+from idbench.experiments.study.ratios import compares_models, interval, pair_of, ratios, ratios_table, study_answer
 from idbench.experiments.study.statistics import BOUNDS, Cell, cells
 from idbench.experiments.study.store import Store, arrays
 from idbench.experiments.study.study import Study
 from idbench.experiments.study.worst_runs import command, worst_runs
 from idbench.experiments.text import new_table, print_table
 from idbench.experiments.text import percent as signed
-from idbench.identify.models import THREE
 
 if TYPE_CHECKING:
     from idbench.experiments.recording.study_recording import StudyRecording
@@ -55,7 +52,7 @@ def report(study: Study, cells: Sequence[Cell], seconds: dict[str, float], folde
         "report.html.j2",
         study=study,
         methods=len(study.methods),
-        headline="" if _compares(study) or not solved else headline(solved, study.edges),
+        headline="" if compares_models(study) or not solved else headline(solved, study.edges),
         answer=study_answer(study, cells),
         typical=typical_figure(alike, axis, study.edges) if solved else "",
         axes=[short(name) for name in cells[0].settings],
@@ -68,7 +65,7 @@ def report(study: Study, cells: Sequence[Cell], seconds: dict[str, float], folde
         ratios=[[where(cell, cells), pair_of(row), interval(row), f"{row['runs']}"] for cell, row in ratios(solved)]
         if study.rows == "equal"
         else [],
-        differences=[] if _compares(study) else list(_differences(solved)),
+        differences=[] if compares_models(study) else list(_differences(solved)),
         details=[row for cell in solved for row in _details(cell, where(cell, cells))],
         failed=[
             (where(c, cells), len(runs), f"{reason} (run {runs[0]})") for c in cells for reason, runs in c.failures.items()
@@ -80,22 +77,6 @@ def report(study: Study, cells: Sequence[Cell], seconds: dict[str, float], folde
         versions=versions(),
         toml=tomli_w.dumps(study.content),
     )
-
-
-def study_answer(study: Study, found: Sequence[Cell]) -> str:
-    """Return the answer of a study: the ratios of the models' errors, or which method errs least."""
-    if not (_compares(study) and any(cell.runs for cell in found)):
-        return answer(found, study.edges)
-    return " ".join(filter(None, [conclusion([row for _, row in ratios(found)]), failures(found)])) or answer(found)
-
-
-def _compares(study: Study) -> bool:
-    """True if a study compares the models over kinds of noise, by equal numbers of rows.
-
-    It has too many methods for a test of every pair: the draws of a permutation test grow with the number of pairs.
-    """
-    noises = any(axis.field == "noise" for axis in study.axes)
-    return study.rows == "equal" and set(THREE) <= set(study.models) and "GLS" in study.estimators and noises
 
 
 def main_axis(study: Study) -> Axis:

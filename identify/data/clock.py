@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
-from idbench.identify.arrays import Array
+from idbench.identify.arrays import TINY, Array
 from idbench.identify.data.log_columns import LogColumns
 from idbench.identify.errors import LogError
 
@@ -69,7 +69,7 @@ class LogClock:
         clocks = dict(_clocks(t[rows]))
         rough = {word: _roughness(times, columns.q[rows]) for word, times in clocks.items()}
         word = next(word for word, left in rough.items() if ROUGHER * left <= min(rough.values()))
-        relative = {name: value / max(rough["stamps"], 1e-300) for name, value in rough.items()}
+        relative = {name: value / max(rough["stamps"], TINY) for name, value in rough.items()}
         steady = clocks.get("steady", t[rows]) if word == "stamps" else clocks[word]
         jitter = float(np.std(steady - t[rows]))
         return cls(rows, clocks[word], repeated, backward, broken, word, jitter, relative)
@@ -126,12 +126,12 @@ class LogClock:
         if self.word == "steady":
             yield (
                 f"stamps jitter by {1e3 * self.jitter:.2g} ms about a steady clock of {1 / self.period:.5g} Hz, at which "
-                f"positions are {1 / max(self.roughness['steady'], 1e-300):.2g} times smoother: its times are taken"
+                f"positions are {1 / max(self.roughness['steady'], TINY):.2g} times smoother: its times are taken"
             )
         if self.word == "rows":
             yield (
                 f"rows come at {1 / self.period:.5g} Hz, whatever their stamps say: positions are "
-                f"{1 / max(self.roughness['rows'], 1e-300):.2g} times smoother so"
+                f"{1 / max(self.roughness['rows'], TINY):.2g} times smoother so"
             )
         if self.filled:
             yield f"samples never logged, or left out: {self.filled}, filled in by their neighbours; held torques are averaged"

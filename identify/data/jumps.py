@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
-from idbench.identify.arrays import Array
+from idbench.identify.arrays import TINY, Array
 
 OFF = 0.05  # Share of a step by which a difference of positions may miss a whole number of steps: files are rounded
 MIN_DIFFERENCES = 20  # Differences that it takes
@@ -166,7 +166,7 @@ class Velocities:
             if np.any(v[:, j]):
                 a, b = np.linalg.lstsq(np.stack([v[:, j], -dv[:, j]], axis=1), logged[:, j])[0]
                 scale[j], delay[j] = a, b / a if a else np.nan
-        return cls(scale, delay, white_noise(qd) / np.maximum(2 * np.pi * white_noise(q), 1e-300), fs)
+        return cls(scale, delay, white_noise(qd) / np.maximum(2 * np.pi * white_noise(q), TINY), fs)
 
     @property
     def consistent(self) -> npt.NDArray[np.bool_]:

@@ -51,6 +51,11 @@ class LogColumns:
         """Number of joints."""
         return self.q.shape[1]
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the joints, or their numbers."""
+        return self.joints or tuple(f"joint {j + 1}" for j in range(self.n))
+
     def rows(self, kept: slice | npt.NDArray[np.intp]) -> Self:
         """Return the columns at some of their times; torques that have times of their own stay whole."""
         qd, warm = (None if x is None else x[kept] for x in (self.qd, self.temperature))

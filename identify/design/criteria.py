@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from idbench.identify.arrays import Array
+from idbench.identify.arrays import TINY, Array
 
 SINGULAR = 1e-13  # Share of the largest eigenvalue, of scaled information, below which a direction counts as not told
 HIDDEN = 1e-6  # Share of a parameter in such directions from which on it is unknown
@@ -123,7 +123,7 @@ CRITERIA: Mapping[str, AbstractCriterion] = {
 def _ends(M: Array) -> tuple[Array, Array]:
     """Return the smallest and the largest eigenvalue, the smallest above 0."""
     values: Array = np.asarray(np.linalg.eigvalsh(M))
-    return np.asarray(np.maximum(values[..., 0], 1e-300)), values[..., -1]
+    return np.asarray(np.maximum(values[..., 0], TINY)), values[..., -1]
 
 
 def _square(v: Array) -> Array:
@@ -132,7 +132,7 @@ def _square(v: Array) -> Array:
 
 def sigmas_of(M: Array) -> Array:
     """Return standard deviations, shape (..., p), of information, shape (..., p, p); infinite where it tells nothing."""
-    size = np.sqrt(np.maximum(np.diagonal(M, axis1=-2, axis2=-1), 1e-300))  # units must not matter
+    size = np.sqrt(np.maximum(np.diagonal(M, axis1=-2, axis2=-1), TINY))  # units must not matter
     values, vectors = np.linalg.eigh(M / size[..., :, None] / size[..., None, :])
     told = values > SINGULAR * values[..., -1:]
     variance = np.sum(np.where(told, 1 / np.where(told, values, 1.0), 0.0)[..., None, :] * vectors**2, axis=-1)

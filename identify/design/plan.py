@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from idbench.identify.arrays import Array
+from idbench.identify.arrays import TINY, Array
 from idbench.identify.data.kinematics import Limits
 from idbench.identify.design.criteria import AbstractCriterion
 from idbench.identify.design.information import Information
@@ -127,7 +127,7 @@ class Plan:
         parts = self.information.torques(motion, D, self.X)
         tau, spread = parts.sum(axis=-1), np.abs(parts).sum(axis=-1)
         most, worst = 1 / (self.torque_share * self.limits.torque), 1 / self.limits.torque
-        mean, inside = np.sqrt(np.mean(tau[:count] ** 2, axis=0) + 1e-300), (np.arange(len(tau)) < count)[:, None]
+        mean, inside = np.sqrt(np.mean(tau[:count] ** 2, axis=0) + TINY), (np.arange(len(tau)) < count)[:, None]
         over = np.maximum(np.abs(tau) * most - NEAR, 0.0)
         above = np.maximum((np.abs(tau) + self.prior_error * spread) * worst - NEAR, 0.0)
         warm = np.maximum(mean / self.limits.rms_torque - NEAR, 0.0)
@@ -142,12 +142,12 @@ class Plan:
         sizes = SLACK * self.limits.sizes
         use = self.instants.at(c) / sizes
         largest = np.abs(use).max(axis=(-3, -2), keepdims=True)
-        relative = use / np.maximum(largest, 1e-300)
-        total = np.maximum(np.sum(relative**self.power, axis=(-3, -2)), 1e-300)  # of no motion at all
+        relative = use / np.maximum(largest, TINY)
+        total = np.maximum(np.sum(relative**self.power, axis=(-3, -2)), TINY)  # of no motion at all
         norm = largest[..., 0, 0, :] * total ** (1 / self.power)
         by_use = relative ** (self.power - 1) * total[..., None, None, :] ** (1 / self.power - 1)
         of_norm = np.einsum("dtm,...dtj->...mj", self.instants.values, by_use / sizes)
-        size = np.log(np.maximum(norm, 1e-300))  # powers of large motions would overflow
+        size = np.log(np.maximum(norm, TINY))  # powers of large motions would overflow
         log_scale = -np.logaddexp(0.0, self.power * size) / self.power
         scale, by_norm = np.exp(log_scale), -np.exp((self.power + 1) * log_scale + (self.power - 1) * size)
         return scale, by_norm[..., None, :] * of_norm

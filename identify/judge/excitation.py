@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
-from idbench.identify.arrays import Array
+from idbench.identify.arrays import TINY, Array
 from idbench.identify.basis.basis import Basis
 from idbench.identify.data.kinematics import KinematicTree
 from idbench.identify.data.log_columns import LogColumns
@@ -161,7 +161,7 @@ def brisk_shares(tree: KinematicTree, basis: Basis, X: Array, sigma: Array) -> A
     W = columns_at(basis, random_states(tree, STATES))
     torque = np.sqrt(np.mean(np.einsum("jpt,p->jt", W, X) ** 2, axis=-1))
     parts = np.sqrt(np.mean(W**2, axis=-1)) * sigma
-    return np.max(parts / np.maximum(torque, 1e-300)[:, None], axis=0)
+    return np.max(parts / np.maximum(torque, TINY)[:, None], axis=0)
 
 
 def _moves(n: int) -> Iterator[tuple[int, ...]]:

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from idbench.identify.arrays import Array
+from idbench.identify.arrays import TINY, Array
 from idbench.identify.estimators.problem import Problem
 from idbench.identify.judge.residuals import Instants
 from idbench.identify.models import ExplicitModel
@@ -83,7 +83,7 @@ def row_noise(left: Instants, signals: Signals, chain: Chain) -> Array:
     fs = signals.fs
     length = min(left.residual.shape[-1], round(fs / RESOLUTION))
     f, S = welch(left.residual * left.weight, fs, length)
-    S = S / np.maximum(np.mean(left.weight**2, axis=-1, keepdims=True), 1e-300)
+    S = S / np.maximum(np.mean(left.weight**2, axis=-1, keepdims=True), TINY)
     passed = gain_of(chain.operator.response(fs), length)
     kinds = np.stack([gain_of(impulse, length) ** 2 for impulse in _impulses(signals, chain)])
     above = (passed < QUIET * passed[0]) & (f > f[np.argmax(passed < QUIET * passed[0])]) & (f < 0.95 * fs / 2)

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
-from idbench.identify.arrays import Array
+from idbench.identify.arrays import TINY, Array
 from idbench.identify.data.motion_log import MotionLog
 from idbench.identify.errors import LogError
 from idbench.identify.estimators.problem import Problem
@@ -210,7 +210,7 @@ class _Joint:
     @property
     def rows(self) -> float:
         """How many rows there are, those of which a part is masked by their part."""
-        return max(float(np.sum(self.share[self.valid] ** 2)), 1e-300)
+        return max(float(np.sum(self.share[self.valid] ** 2)), TINY)
 
     def _rms(self, x: Array) -> float:
         """Return the rms of what valid rows have, as if nothing of them were masked."""
@@ -235,7 +235,7 @@ class _Joint:
         valid = self.valid & (self.spread > FAINT * self.spread.max(initial=0.0))
         rho = np.divide(self.rho, self.spread, out=np.zeros(len(self.spread)), where=valid)
         rho[valid] -= rho[valid].mean()
-        variance = max(float(np.mean(rho[valid] ** 2)), 1e-300)
+        variance = max(float(np.mean(rho[valid] ** 2)), TINY)
         departures = [0.0]
         for lag in range(2, min(LAGS, len(rho) - 1) + 1):
             pairs = int(np.count_nonzero(valid[lag:] & valid[:-lag]))

@@ -10,9 +10,9 @@ from weakref import proxy
 import numpy as np
 
 from idbench.identify.arrays import Array
-from idbench.identify.blame import expect
+from idbench.identify.blame import expect, expect_kind
 from idbench.identify.data.motion_log import MotionLog, TorqueChannel
-from idbench.identify.errors import LogError, PluginError
+from idbench.identify.errors import LogError
 from idbench.identify.signals.filters import AbstractDifferentiator
 from idbench.identify.signals.masks import AbstractMask
 from idbench.identify.signals.prefilters import AbstractPrefilter
@@ -173,10 +173,7 @@ class Signals:
         return self.prefilter.apply(back[0] + self.s(back[1] + self.s(back[2])), self.fs)[..., ::-1]
 
     def _aligned(self, tau: Array, channel: TorqueChannel) -> Torque:
-        torque = self.alignment.align(tau, channel, self.fs)
-        if not isinstance(torque, Torque):
-            raise PluginError(f"plug-in {type(self.alignment).__name__}.align returned {torque!r:.60}, expected a Torque")
-        return torque
+        return expect_kind(self.alignment, "align", self.alignment.align(tau, channel, self.fs), Torque)
 
     def _prefiltered(self, x: Array) -> Array:
         signal = np.ascontiguousarray(np.swapaxes(x, -1, -2))

@@ -3,14 +3,12 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from math import isfinite
-from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
-from idbench.identify.blame import expect
+from idbench.identify.blame import expect, expect_kind
 from idbench.identify.data.motion_log import MotionLog
-from idbench.identify.errors import PluginError
 from idbench.sim.controllers import AbstractLaw, Task
 from idbench.sim.drives.drive import AbstractAmplifier, every
 from idbench.sim.encoders import AbstractReader
@@ -27,8 +25,6 @@ from idbench.sim.robot.robot import Robot
 from idbench.sim.scenario.measurement import CurrentSensor
 from idbench.sim.scenario.scenario import Scenario
 from idbench.sim.trajectories import Reference
-
-T = TypeVar("T")
 
 NOISE = 2  # Stream of random numbers of the torque's noise
 
@@ -65,13 +61,14 @@ class Bench:
         self._plant = plant_of(scenario, robot, nsim, self._h, vary, threads)
         self._plant.put(planned.q[0])
         task = Task(scenario.nominal_robot, planned, nsim, vary if informed else {})
-        self._law = _started(scenario.controller, scenario.controller.start(task), AbstractLaw)
-        self._drive = _started(scenario.drive, scenario.drive.start(robot, nsim, self._h), AbstractAmplifier)
+        self._law = expect_kind(scenario.controller, "start", scenario.controller.start(task), AbstractLaw)
+        self._drive = expect_kind(scenario.drive, "start", scenario.drive.start(robot, nsim, self._h), AbstractAmplifier)
         self._cogging, self._commutation = scenario.ripple.start(robot)
         self._smooth = scenario.ripple.steady
         friction, encoder = scenario.friction, scenario.encoder
-        self._friction = _started(friction, friction.start(self._plant.joints, self._plant.Fs, self._h), AbstractContact)
-        self._encoder = _started(encoder, encoder.start(n, samples, fs, generators(seeds, 0)), AbstractReader)
+        contact = friction.start(self._plant.joints, self._plant.Fs, self._h)
+        self._friction = expect_kind(friction, "start", contact, AbstractContact)
+        self._encoder = expect_kind(encoder, "start", encoder.start(n, samples, fs, generators(seeds, 0)), AbstractReader)
         self._each = nsim, n
         self._sensor = CurrentSensor(scenario.torque, nsim, n)
         self._jitter = self._drawn_jitter(samples) if scenario.timing.jitter or scenario.timing.refresh else None
@@ -249,13 +246,6 @@ def _holding(scenario: Scenario, robot: Robot, at_rest: Array, vary: Mapping[str
         return at_rest.copy()
     still = np.zeros_like(at_rest)
     return InverseDynamics(robot, len(at_rest), vary)(at_rest, still, still)
-
-
-def _started(settings: object, made: T, kind: type) -> T:
-    """Object that a plug-in started; raise PluginError if it is of another kind."""
-    if not isinstance(made, kind):
-        raise PluginError(f"plug-in {type(settings).__name__}.start returned {made!r:.60}, expected an {kind.__name__}")
-    return made
 
 
 def generators(seeds: Sequence[int], stream: int) -> list[np.random.Generator]:

@@ -60,7 +60,7 @@ class AbstractTrajectory(ABC):
     def motion(self, robot: Robot) -> AbstractMotion:
         """Return the motion for `robot`, checked: one that lasts for a while; raise PluginError or ScenarioError if not."""
         with blamed():
-            planned = expect_kind(self, "plan", self.plan(robot), AbstractMotion)  # type: ignore[type-abstract]
+            planned = expect_kind(self, "plan", self.plan(robot), AbstractMotion)
         if not 0 <= planned.duration < LONGEST:
             raise ScenarioError(f"the motion lasts {planned.duration:.3g} s: it must be 0 to {LONGEST:.0e} s")
         return planned

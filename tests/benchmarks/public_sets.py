@@ -26,7 +26,7 @@ from idbench.experiments.errors import ExperimentError, is_told, reason, report
 from idbench.experiments.exports.exports import EXPORTS
 from idbench.experiments.identification.fit import Fit
 from idbench.experiments.identification.fitting import fit
-from idbench.experiments.identification.job import fit_of, read_logs, read_options, request_of
+from idbench.experiments.identification.job import fit_of, read_logs, request_of
 from idbench.experiments.identification.load import with_held_out
 from idbench.experiments.identification.logs import Logs
 from idbench.experiments.identification.reading import ReadLog, file_of, late, read_as
@@ -126,7 +126,7 @@ def fitted(folder: Path, definition: Definition, asked: IdentifyRequest) -> SetF
     """The fit of a set; without held-out logs, of all but the last quarter of its longest."""
     begin = time.perf_counter()
     loaded = read_logs(asked, request_of(asked))
-    logs = with_held_out(loaded, asked.validate, read_options(asked), None)
+    logs = with_held_out(loaded, asked, None)
     if definition.held_out:
         logs = replace(logs, held_out=dict(zip(definition.held_out, (logs.held_out or {}).values(), strict=True)))
     else:
@@ -137,10 +137,10 @@ def fitted(folder: Path, definition: Definition, asked: IdentifyRequest) -> SetF
     made = fit_of(loaded.request, logs)
     seconds = time.perf_counter() - begin
     read = dict(zip(definition.fit, loaded.read, strict=True))
-    options = replace(read_options(asked), delay=None, fallback=replace(loaded.read[0].channel, gain=1.0))
+    options, known = replace(asked, torque_delay=None), replace(loaded.read[0].channel, gain=1.0)
     for name in (*definition.held_out, *definition.repeats):
         if name not in read:
-            read[name] = read_as(loaded.read[0].path, file_of(folder / name), options, loaded.request.robot_model)
+            read[name] = read_as(loaded.read[0].path, file_of(folder / name), options, loaded.request.robot_model, known)
     return SetFit(definition, made, read, seconds)
 
 

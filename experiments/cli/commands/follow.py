@@ -11,10 +11,12 @@ import numpy as np
 
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.logs import delay_method
-from idbench.experiments.identification.reading import ReadOptions, read
+from idbench.experiments.identification.reading import read
 from idbench.experiments.identification.request import Request
 from idbench.experiments.recording.audience import Audience
+from idbench.experiments.requests.shared import LogRequest
 from idbench.identify import IdentificationError, MotionLog, measured_state
+from idbench.identify.arrays import TINY
 from idbench.identify.files.log_file import CSV
 
 if TYPE_CHECKING:
@@ -33,7 +35,7 @@ class Follower:
 
     path: Path
     """The log, CSV."""
-    options: ReadOptions
+    options: LogRequest
     """How its torque is to be read."""
     request: Request
     """Robot and chain."""
@@ -110,8 +112,9 @@ class Follower:
             copy = Path(folder) / self.path.name
             copy.write_bytes(lines)
             try:
-                delay = None if delay_method(self.options.delay) else self.options.delay  # an estimate comes at the end
-                return read(copy, replace(self.options, delay=delay), self.request.robot_model).longest
+                stated = self.options.torque_delay
+                delay = None if delay_method(stated) else stated  # an estimate comes at the end
+                return read(copy, replace(self.options, torque_delay=delay), self.request.robot_model).longest
             except (ExperimentError, IdentificationError) as error:
                 complaint = str(error).replace(str(copy), str(self.path))
                 if lines.count(b"\n") > FEW and complaint != self._complaint:
@@ -143,7 +146,7 @@ def _words(live: "LiveIdentification", now: float) -> str:
     if live.fit is None:
         return f"{now:.1f} s"
     estimate = next(iter(live.fit.estimates.values()))
-    shares = 100 * estimate.standard_errors / np.maximum(np.abs(estimate.X), 1e-300)
+    shares = 100 * estimate.standard_errors / np.maximum(np.abs(estimate.X), TINY)
     weakest = int(np.argmax(np.nan_to_num(shares, nan=np.inf)))
     known = np.count_nonzero(shares < KNOWN)
     return (

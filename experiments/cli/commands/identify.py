@@ -19,7 +19,6 @@ from idbench.experiments.identification.job import (
     fit_of,
     loaded_logs,
     notes_of,
-    read_options,
     request_of,
     summary_of,
 )
@@ -124,7 +123,7 @@ def _followed(stack: ExitStack, options: Identify, request: Request, audience: A
         raise ExperimentError("--follow takes one log, not several")
     if not 0 < options.follow < float("inf"):
         raise ExperimentError(f"--follow {options.follow:g} must be above 0: for how long [s] a complete log has not grown")
-    follower = Follower(options.log[0], read_options(options), request, audience)
+    follower = Follower(options.log[0], options, request, audience)
     follower.follow(options.follow)
     folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="idbench-"))
     return replace(options, log=(follower.complete(Path(folder)),))

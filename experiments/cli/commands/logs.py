@@ -169,7 +169,7 @@ def resample(options: Resample) -> None:
     for path in outs:  # all of them, before the first is written
         require_free(path, "--out", force=options.force, read=read)
     with shown(page):
-        for words in made.words(columns.joints or tuple(f"joint {j + 1}" for j in range(columns.n))):
+        for words in made.words(columns.names):
             page.print(Text(words), soft_wrap=True)
         for path, log in zip(outs, made.logs, strict=True):
             with new_file(path, "--out", force=options.force, read=read) as file:

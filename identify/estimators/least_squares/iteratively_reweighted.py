@@ -7,7 +7,7 @@ from typing import ClassVar, Self
 import numpy as np
 import numpy.typing as npt
 
-from idbench.identify.arrays import Array, frozen
+from idbench.identify.arrays import TINY, Array, frozen
 from idbench.identify.data.motion_log import MotionLog
 from idbench.identify.errors import require_positive, require_whole
 from idbench.identify.estimators.estimate import Estimate
@@ -160,7 +160,7 @@ def _relative(problem: Problem, kinds: Kinds) -> Array:
 
 def _least(Y: Array, kinds: Kinds) -> Array:
     """Least noise, shape (..., kind): a share of the measurements' rms."""
-    return np.maximum(EXACT * np.sqrt(np.mean(kinds.by_kind(Y) ** 2, axis=-2)), 1e-300)
+    return np.maximum(EXACT * np.sqrt(np.mean(kinds.by_kind(Y) ** 2, axis=-2)), TINY)
 
 
 def _tukey(x: Array, tuning: float) -> Array:

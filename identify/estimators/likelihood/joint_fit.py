@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
-from idbench.identify.arrays import Array
+from idbench.identify.arrays import TINY, Array
 from idbench.identify.basis.basis import Basis
 from idbench.identify.errors import IdentificationError
 from idbench.identify.estimators.likelihood.cells import HELD, Cells
@@ -208,13 +208,13 @@ class JointFit:
         parts, count = [system.solved() for system in systems], len(self.unknowns)
         S = np.asarray(sum(system.corner - V.T @ V for system, (V, _, _) in zip(systems, parts, strict=True)))[:count, :count]
         b = np.asarray(sum(system.b_parameters - V.T @ y for system, (V, y, _) in zip(systems, parts, strict=True)))[:count]
-        size = np.sqrt(np.maximum(np.diag(S), 1e-300))
+        size = np.sqrt(np.maximum(np.diag(S), TINY))
         return parts, np.linalg.pinv(S / np.outer(size, size), hermitian=True) / np.outer(size, size), b
 
 
 def _sigmas(dX: Array, covariance: Array) -> float:
     """Return the largest change of a parameter, in sigma."""
-    return float(np.max(np.abs(dX) / np.sqrt(np.maximum(np.diag(covariance), 1e-300))))
+    return float(np.max(np.abs(dX) / np.sqrt(np.maximum(np.diag(covariance), TINY))))
 
 
 def _begin(cells: Cells) -> Array:

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from idbench.identify.arrays import Array
+from idbench.identify.arrays import TINY, Array
 from idbench.identify.data.motion_log import MotionLog
 from idbench.identify.estimators.estimate import Estimate
 from idbench.identify.estimators.estimator import Need
@@ -61,7 +61,7 @@ def gauss_newton(problem: Problem, rounds: Rounds, output: Output, kinds: Kinds)
         residual = measured - made[0]
         found = solve_with(kinds, residual, J, J)
         size = np.sqrt(np.mean(kinds.by_kind(residual * kinds.own) ** 2, axis=-2))
-        size = np.nan_to_num(np.exp(np.mean(np.log(np.maximum(size, 1e-300)), axis=-1)), nan=np.inf)
+        size = np.nan_to_num(np.exp(np.mean(np.log(np.maximum(size, TINY)), axis=-1)), nan=np.inf)
         # Half the way back from where residuals are larger than they were.
         ahead = np.where((size > WORSE * least)[..., None], (X + best) / 2, X + found.X)
         better = size < least
