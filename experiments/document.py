@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from importlib.metadata import version
 
 from rich.console import Console
 
@@ -47,3 +48,10 @@ class Document:
     """What else belongs to it: what was read and assumed."""
     figures: Callable[[], Sequence[tuple[str, str]]] = tuple
     """Makes titles and SVG of its pictures."""
+
+    def page(self, command: str) -> str:
+        """Page of one HTML file, with the command that makes the result again."""
+        from idbench.experiments.reports.figures import rendered  # what draws pictures is not loaded for a few lines of text
+
+        shown = {"document": self, "figures": self.figures(), "command": command, "version": version("idbench")}
+        return rendered("idbench.experiments.reports", "plain.html.j2", title=self.title, **shown)

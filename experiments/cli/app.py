@@ -107,9 +107,9 @@ def _do(command: Callable[[], None]) -> None:
 
 
 def _print(text: str) -> None:
-    from idbench.experiments.results.page import new_page
+    from idbench.experiments.results.page import Page
 
-    page = new_page()
+    page = Page()
     page.print(text)
     page.close()
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from math import ceil
 
 import numpy as np
@@ -24,6 +25,7 @@ from idbench.experiments.reports.friction_curves import (
 from idbench.experiments.text import GREY, JOINTS, SIGMAS, Color, model_color, percent_reach
 from idbench.identify import Array, Instants, binned, cutoffs
 
+TRUE = "true"  # Name of the friction that is known
 LINEAR_UP_TO = 1e-3  # Difference [sigma] up to which the axis is linear
 
 
@@ -62,7 +64,7 @@ def send_parameters(stream: Stream, at: str, fit: Fit, number: int = 0) -> None:
         far = [np.where(unsure, np.nan, np.abs(off[form]) + reach[form])[members] for form in off]
         chart = Chart(stream, f"{at}/parameters/{k:02}/{part(title)}", _scale(fit, far), listed("", names), SQUARE)
         ends = np.array([-0.5, len(members) - 0.5])
-        chart.line("true" if fit.truth else next(iter(fit.estimates)), np.zeros(2), ends, GREY, listed=False)
+        chart.line(TRUE if fit.truth else next(iter(fit.estimates)), np.zeros(2), ends, GREY, listed=False)
         for i, form in enumerate(fit.estimates):
             x, half = off[form][members], reach[form][members]
             y = np.arange(float(len(members))) + ASIDE * (i - (len(fit.estimates) - 1) / 2)
@@ -147,7 +149,7 @@ class ResidualCharts:
         """
         force, way = self.fit.robot_model.units(j)
         if kind == "over_velocity":
-            rows = {form: FrictionCurves(self.fit, self.fit.estimates[form].X).rows(j) for form in left}
+            rows = {form: self._curves[form].rows(j) for form in left}
             points = {form: (v, residual, weight) for form, (v, residual, _, weight) in rows.items()}
         else:
             points = {f: (x.equations.signals.state.q[j, x.inner], x.residual[j], x.weight[j]) for f, x in left.items()}
@@ -175,10 +177,7 @@ class ResidualCharts:
         if not any(p.kind in FRICTIONS and p.joint == j for p in self.fit.basis.parameters):
             return
         force, way = self.fit.robot_model.units(j)
-        found = {form: self.fit.estimates[form].X for form in left}
-        if self.fit.truth is not None:
-            found["true"] = np.array(list(self.fit.truth.values()))
-        curves = {name: FrictionCurves(self.fit, X) for name, X in found.items()}
+        curves = {name: each for name, each in self._curves.items() if name in (*left, TRUE)}
         v, _, torque, weight = curves[next(iter(left))].rows(j)
         laws = {name: list(each.laws(j)) for name, each in curves.items()}
         every = [curve for each in laws.values() for curve in each]
@@ -189,6 +188,14 @@ class ResidualCharts:
         for name, each in laws.items():
             v, torque = (np.concatenate([np.append(x, np.nan) for x in xs]) for xs in zip(*each, strict=True))
             chart.line(name, v, torque, self._color(name), 2.5 if name == "explicit" else 1.2)
+
+    @cached_property
+    def _curves(self) -> dict[str, FrictionCurves]:
+        """Friction by each estimate, and by the truth where that is known."""
+        found = {form: estimate.X for form, estimate in self.fit.estimates.items()}
+        if self.fit.truth is not None:
+            found[TRUE] = np.array(list(self.fit.truth.values()))
+        return {name: FrictionCurves(self.fit, X) for name, X in found.items()}
 
     def _spectrum(self, found: Spectrum) -> None:
         """Send spectra of the residuals of a row, the prediction from the estimated noise, and the cut-offs of the chain."""
@@ -215,4 +222,4 @@ def _most(x: Array) -> Array:
     return np.array([low, high]) + 0.5 * (high - low) * np.array([-1.0, 1.0])
 
 
-COLORS: dict[str, Color] = {"true": GREY, "torque noise": JOINTS[1], "position noise": JOINTS[0]}
+COLORS: dict[str, Color] = {TRUE: GREY, "torque noise": JOINTS[1], "position noise": JOINTS[0]}

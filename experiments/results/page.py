@@ -6,7 +6,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import closing, contextmanager
+from contextlib import contextmanager
 from io import StringIO
 from typing import Any, Protocol, TextIO
 
@@ -110,6 +110,8 @@ NOT_SAVED = "not saved: --out FOLDER keeps it, with a report and a recording"  #
 class Page(Console):
     """A console that keeps what is printed until it is shown; what cannot be shown is reported at the end.
 
+    `contextlib.closing` shows it at the end of a block, however that ends: it is worth keeping.
+
     Parameters
     ----------
     machine : bool
@@ -190,12 +192,3 @@ class Page(Console):
             self._gone = True
         except OSError as error:
             self._failure = str(error.strerror)
-
-
-def new_page(*, machine: bool = False) -> Page:
-    """Return an empty page."""
-    return Page(machine=machine)
-
-
-shown = closing
-"""Shows what a page holds at the end of the block, however that ends: it is worth keeping."""

@@ -10,8 +10,8 @@ import numpy as np
 
 from idbench.identify.arrays import HELD, Array, Columns
 from idbench.identify.basis.block import AbstractBlock, Kind, Parameter
-from idbench.identify.blame import expect
-from idbench.identify.errors import PluginError, SettingError
+from idbench.identify.blame import expect, expect_kind
+from idbench.identify.errors import SettingError
 from idbench.identify.signals.signals import State
 
 
@@ -184,11 +184,7 @@ class Basis:
         """Columns of every block by one column function, together."""
         shape, total = (*state.q.shape[:-2], state.q.shape[-1]), dict[tuple[int, int], Array]()
         for block in self.blocks:
-            held, found = self.held_of(block), getattr(block, function)(state)
-            if not isinstance(found, Mapping):
-                raise PluginError(
-                    f"plug-in {type(block).__name__}.{function} returned {found!r:.60}, expected a mapping of columns"
-                )
+            held, found = self.held_of(block), expect_kind(block, function, getattr(block, function)(state), Mapping)
             for (row, parameter), signal in found.items():
                 if (place := self.places.get(parameter)) is not None:
                     if np.shape(signal) != shape:

@@ -19,7 +19,7 @@ from mujoco.batch import Batch
 
 from idbench.experiments.recording.study_recording import StudyRecording
 from idbench.experiments.results.folder import ResultsFolder
-from idbench.experiments.results.page import new_page
+from idbench.experiments.results.page import Page
 from idbench.experiments.study.cluster import cluster_pool
 from idbench.experiments.study.run_study import local_pool, run_missing
 from idbench.experiments.study.store import Store
@@ -68,7 +68,7 @@ def timed(runs: int, workers: int, report: bool) -> tuple[float, float]:
             took = time.perf_counter() - start - up
         if report:
             results = ResultsFolder(store.folder, "study", "benchmark")
-            write_results(new_page(), store, results, StudyRecording(described, store.folder, None))
+            write_results(Page(), store, results, StudyRecording(described, store.folder, None))
             print(f"  report, recording and summary: {time.perf_counter() - start - took - up:.1f} s more")
         seconds = store.seconds()
         print(f"  start {up:.1f} s, not in the ratio below")

@@ -9,14 +9,14 @@ from idbench.experiments.contracts.contract import Example
 from idbench.experiments.contracts.contracts import found, keeps
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.program import program
-from idbench.experiments.results.page import new_page, stages_of
+from idbench.experiments.results.page import Page, stages_of
 from idbench.experiments.starters.starters import new_example, new_plugin, new_scenario, new_study
 
 
 def begin(options: New) -> None:
     """Write what to start from."""
     folder = options.what in ("plugin", "example")
-    page, out = new_page(), options.out or Path(options.name if folder else f"{options.name}.toml")
+    page, out = Page(), options.out or Path(options.name if folder else f"{options.name}.toml")
     if options.what == "scenario":
         new_scenario(options.name, options.like, out)
         how = f"{program()} run {out}"
@@ -36,7 +36,7 @@ def begin(options: New) -> None:
 
 def check(options: Check) -> None:
     """Print what a plug-in is asked to do, and what of it is kept; raise ExperimentError if something is not."""
-    page, (table, plugin) = new_page(machine=options.json), found(options.plugin)
+    page, (table, plugin) = Page(machine=options.json), found(options.plugin)
     page.print(Text(f"{options.plugin}: {type(plugin).__name__}, of the {table.point}", style="bold"))
     answers = list(keeps(table, plugin, Example()))
     for clause, complaint in answers:

@@ -5,11 +5,11 @@ from rich.text import Text
 from idbench.experiments.cli.app import COMMANDS, DESCRIPTION
 from idbench.experiments.cli.options.tools import Completion
 from idbench.experiments.cli.parser import every_command
-from idbench.experiments.results.page import new_page
+from idbench.experiments.results.page import Page
 
 
 def complete(options: Completion) -> None:
     """Print the script; bash names files where there are no words."""
-    page, script = new_page(), every_command(COMMANDS, DESCRIPTION).generate_completion(shell=options.shell)
+    page, script = Page(), every_command(COMMANDS, DESCRIPTION).generate_completion(shell=options.shell)
     page.print(Text(script.replace("complete -F ", "complete -o default -F ")), soft_wrap=True)
     page.close()

@@ -5,7 +5,7 @@ from rich.text import Text
 from idbench.experiments.cli.options.tools import ShowDevice
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.robot_model import absolute
-from idbench.experiments.results.page import Page, new_page
+from idbench.experiments.results.page import Page
 from idbench.experiments.results.writing import require_free, write_text
 from idbench.experiments.servo.device import BENCH, device_of, devices, mjcf_of_device, servo_toml_of
 from idbench.experiments.servo.servo_files import cannot_express
@@ -16,7 +16,7 @@ from idbench.sim.robot.robot import Robot
 
 def device(options: ShowDevice) -> None:
     """List devices, or print one, and write its files."""
-    page = new_page(machine=options.json)
+    page = Page(machine=options.json)
     for option, path, ending in (("--write-mjcf", options.write_mjcf, ".xml"), ("--write", options.write, ".toml")):
         if path is not None:
             if path.suffix != ending:

@@ -1,6 +1,7 @@
 """The command that designs motions."""
 
 from collections.abc import Callable
+from contextlib import closing
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,7 +19,7 @@ from idbench.experiments.program import program
 from idbench.experiments.recording.audience import Audience
 from idbench.experiments.reports.excite import print_excited, print_sequence
 from idbench.experiments.results.folder import ResultsFolder
-from idbench.experiments.results.page import new_page, progress_of, shown
+from idbench.experiments.results.page import Page, progress_of
 from idbench.identify.files.log_file import write_log
 from idbench.sim.limits.motion_limits import looser
 
@@ -32,8 +33,8 @@ def excite(options: Excite) -> None:
     command = command_of(options, out=True)
     whole = command_of(options, absolute=True)
     out = options.out or Path("runs") / f"excited-{stem}"
-    folder, page = ResultsFolder(out, "excite", whole, options.force, files_of(options)), new_page(machine=options.json)
-    with options.watching.audience() as audience, shown(page), folder.held():
+    folder, page = ResultsFolder(out, "excite", whole, options.force, files_of(options)), Page(machine=options.json)
+    with options.watching.audience() as audience, closing(page), folder.held():
         with progress_of(f"designing a motion of {stem}") as progress:
             found, sequence = excited(with_own_parts(options), progress)
             print_excited(page, found)

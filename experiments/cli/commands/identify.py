@@ -2,7 +2,7 @@
 
 import tempfile
 from collections.abc import Mapping, Sequence
-from contextlib import ExitStack, nullcontext
+from contextlib import ExitStack, closing, nullcontext
 from dataclasses import replace
 from pathlib import Path
 
@@ -36,7 +36,7 @@ from idbench.experiments.reports.printed import print_fit
 from idbench.experiments.reports.printed_held_out import print_held_out
 from idbench.experiments.results.attempts import Attempts
 from idbench.experiments.results.folder import ResultsFolder
-from idbench.experiments.results.page import COLORS, Page, new_page, shown, stages_of
+from idbench.experiments.results.page import COLORS, Page, stages_of
 from idbench.experiments.results.writing import write_summary
 from idbench.identify.files.log_file import write_log
 
@@ -45,14 +45,14 @@ ASSUMED = f"no --robot was given, the shipped {SCARA} is assumed"
 
 def identify(options: Identify) -> None:
     """Identify logs, judge the result, save and show it."""
-    page, request = new_page(machine=options.json), request_of(with_own_parts(options))
+    page, request = Page(machine=options.json), request_of(with_own_parts(options))
     command, read = command_of(options, out=True), files_of(options)
     whole, log = command_of(options, absolute=True), file_of(options.log[0]).absolute()
     folder = ResultsFolder(options.out, "identify", whole, options.force, read) if options.out else None
     require_targets(options, request.robot_model, folder, read)
     require_layer(options, request.label, command)
     with ExitStack() as stack:
-        stack.enter_context(shown(page))
+        stack.enter_context(closing(page))
         stack.enter_context(folder.held() if folder else nullcontext())
         audience = stack.enter_context(options.watching.audience())
         options = _followed(stack, options, request, audience)

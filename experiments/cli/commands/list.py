@@ -6,13 +6,13 @@ from rich.text import Text
 
 from idbench.experiments.cli.options.tools import List
 from idbench.experiments.plugin_tables import TABLES, plugin_conflicts
-from idbench.experiments.results.page import new_page
+from idbench.experiments.results.page import Page
 from idbench.identify.plugins import PluginTable
 
 
 def list_plugins(options: List) -> None:
     """List every plug-in."""
-    page = new_page(machine=options.json)
+    page = Page(machine=options.json)
     print_plugins(page)
     page.found |= {table.point: {name: table.summary(name) for name in table} for table in TABLES}
     page.close()

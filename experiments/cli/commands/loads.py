@@ -1,7 +1,7 @@
 """The commands that identify payloads and gains of drives."""
 
 from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import closing, contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +11,6 @@ from rich.text import Text
 from idbench.experiments.cli.command import command_of, with_own_parts
 from idbench.experiments.cli.options.jobs import IdentifyGains, IdentifyPayload
 from idbench.experiments.cli.saving import save_summary
-from idbench.experiments.document import Document
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.inputs import files_of
 from idbench.experiments.loads.job import LoadFit, gains_of, payload_of, simulated_pairs
@@ -20,7 +19,7 @@ from idbench.experiments.loads.loads_text import body_of
 from idbench.experiments.loads.simulated import PairScore
 from idbench.experiments.results.attempts import Attempts
 from idbench.experiments.results.folder import ResultsFolder
-from idbench.experiments.results.page import COLORS, NOT_SAVED, Page, new_page, progress_of, shown, stages_of
+from idbench.experiments.results.page import COLORS, NOT_SAVED, Page, progress_of, stages_of
 from idbench.experiments.results.writing import require_free, write_text
 from idbench.experiments.text import new_table, print_titled
 from idbench.sim.robot.rewrite import with_body
@@ -57,14 +56,14 @@ def gains(options: IdentifyGains) -> None:
 @contextmanager
 def _page(options: IdentifyPayload | IdentifyGains) -> Iterator[tuple[Page, ResultsFolder | None]]:
     """Give the page of a command and the folder of its results, and say in the end where they are."""
-    page, folder = new_page(machine=options.json), None
+    page, folder = Page(machine=options.json), None
     page.found |= {"experiment": options.called}
     if options.out is not None:
         folder = ResultsFolder(
             options.out, options.called, command_of(options, absolute=True), options.force, files_of(options)
         )
         folder.check()
-    with shown(page), folder.held() if folder else nullcontext():
+    with closing(page), folder.held() if folder else nullcontext():
         yield page, folder
         page.print(f"written to {folder.out}" if folder else NOT_SAVED, soft_wrap=True)
 
@@ -96,14 +95,8 @@ def _identified(
             page.warn(document.warnings)
             page.show()
             attempts.attempt("summary.json", lambda: save_summary(page, folder))
-            attempts.file("report.html", lambda: _report(document, command_of(options, out=True)))
+            attempts.file("report.html", lambda: document.page(command_of(options, out=True)))
         yield attempts
-
-
-def _report(document: Document, command: str) -> str:
-    from idbench.experiments.reports.plain import page_of
-
-    return page_of(document, command)
 
 
 def _write_mjcf(page: Page, options: IdentifyPayload, path: Path, made: LoadFit) -> None:

@@ -2,6 +2,7 @@
 
 import shlex
 from collections.abc import Sequence
+from contextlib import closing
 from dataclasses import replace
 from math import log2, log10, pi
 from pathlib import Path
@@ -15,7 +16,7 @@ from idbench.experiments.identification.reading import channel_of, columns_of, s
 from idbench.experiments.identification.robot_model import SCARA
 from idbench.experiments.program import program
 from idbench.experiments.results.attempts import Attempts
-from idbench.experiments.results.page import Page, new_page, shown
+from idbench.experiments.results.page import Page
 from idbench.experiments.results.writing import folder_for, new_file, require_free, write_text
 from idbench.experiments.text import new_table, print_titled
 from idbench.identify import LogError, MotionLog
@@ -32,13 +33,13 @@ ROUNDED = 1e-4  # Departure of a step's logarithm from a whole number up to whic
 
 def show_log(options: ShowLog) -> None:
     """Show what is understood of a log: columns, units, rate, ranges, noise; write a layout to start from."""
-    page = new_page(machine=options.json)
+    page = Page(machine=options.json)
     for option, path in (("--write", _target(options) if options.write else None), ("--picture", options.picture)):
         if path is not None:
             require_free(path, option, force=options.force, read=[options.log])
     found, columns = _understood(options)
     layout, facts = found.layout, LogFacts(columns)
-    with shown(page):
+    with closing(page):
         _print_layout(page, layout, found.doubts)
         raw = needs_gain(layout.tau.unit) and not layout.gain
         _print_facts(page, facts, str(layout.tau.unit) if raw else "N m")
@@ -159,7 +160,7 @@ def resample(options: Resample) -> None:
     if out.suffix.lower() == CSV and (out.parent / LAYOUT).is_file():
         raise ExperimentError(f"--out {out}: {LAYOUT} there would be taken for its columns: choose another folder, or .parquet")
     require_free(out, "--out", force=options.force, read=read)
-    columns, page = columns_of(options.log, options.reading), new_page()
+    columns, page = columns_of(options.log, options.reading), Page()
     meaning = options.torque or (columns.torque.meaning if columns.torque else None)
     if meaning is None:
         raise ExperimentError(f"{options.log} does not say what its torque means: add --torque held, instantaneous or averaged")
@@ -168,7 +169,7 @@ def resample(options: Resample) -> None:
     outs = [out.with_stem(f"{out.stem}{k + 1}") if several else out for k in range(len(made.logs))]
     for path in outs:  # all of them, before the first is written
         require_free(path, "--out", force=options.force, read=read)
-    with shown(page):
+    with closing(page):
         for words in made.words(columns.names):
             page.print(Text(words), soft_wrap=True)
         for path, log in zip(outs, made.logs, strict=True):
@@ -180,12 +181,12 @@ def resample(options: Resample) -> None:
 
 def export(options: Export) -> None:
     """Write the logs of a results folder as CSV."""
-    logs, page = sorted(options.folder.glob("log*.parquet")), new_page()
+    logs, page = sorted(options.folder.glob("log*.parquet")), Page()
     if not logs:
         raise ExperimentError(f"there is no log in {options.folder}: name a results folder, such as runs/table1")
     out = options.out or options.folder
     made = folder_for(out, "--out")
-    with shown(page):
+    with closing(page):
         for path in logs:
             log, target = read_log(path), made / f"{path.stem}.csv"
             with new_file(target, "--out", force=options.force) as file:

@@ -18,7 +18,7 @@ from idbench.experiments.paper.motions_report import picture, print_motions
 from idbench.experiments.paper.table1 import print_table1
 from idbench.experiments.paper.table2 import print_table2
 from idbench.experiments.results.folder import ResultsFolder
-from idbench.experiments.results.page import new_page, progress_of, shown
+from idbench.experiments.results.page import Page, progress_of
 from idbench.experiments.results.writing import require_free, write_text
 from idbench.identify.files.log_file import write_log
 from idbench.sim.scenario.scenario_file import load, to_toml
@@ -37,8 +37,8 @@ def compare(options: Table1Command) -> None:
     if options.motions is not None:
         _over_motions(options, options.motions)
         return
-    folder, page = _folder(options, "table1"), new_page(machine=options.json)
-    with options.watching.audience() as audience, shown(page), folder.held():
+    folder, page = _folder(options, "table1"), Page(machine=options.json)
+    with options.watching.audience() as audience, closing(page), folder.held():
         with _searching() as told:
             table = table1_of(options, told)
         print_table1(page, table)
@@ -56,8 +56,8 @@ def _over_motions(options: Table1Command, motions: int) -> None:
         raise ExperimentError(
             "--motions draws motions of its own and compares the paper's chains: leave --scenario and --chain out"
         )
-    folder, page = _folder(options, "table1-motions"), new_page(machine=options.json)
-    with shown(page), folder.held():
+    folder, page = _folder(options, "table1-motions"), Page(machine=options.json)
+    with closing(page), folder.held():
         with progress_of("drawing and identifying motions") as progress:
             found = Table1Motions(motions, options.seed or 0, progress=progress)
             print_motions(page, found)
@@ -69,8 +69,8 @@ def search(options: SearchCommand) -> None:
     """Search a trajectory."""
     if options.out is not None:
         require_free(options.out, "--out", force=options.force)
-    page = new_page()
-    with shown(page):
+    page = Page()
+    with closing(page):
         with _searching() as told:
             scenario = searched(options.seed, told)
         if options.out is None:
@@ -91,8 +91,8 @@ def table2(options: Table2Command) -> None:
     """Repeat the paper's experiment and attribute its errors."""
     watching, folder = options.watching, _folder(options, "table2")
     require_window(options.inner, watching)
-    page, described = new_page(machine=options.json), load(options.scenario)
-    with watching.audience() as audience, shown(page), folder.held():
+    page, described = Page(machine=options.json), load(options.scenario)
+    with watching.audience() as audience, closing(page), folder.held():
         recording = recording_of(described, audience, options.inner) if watching.rerun else None
         with (
             progress_of("simulating") as progress,

@@ -15,7 +15,7 @@ from idbench.experiments.cli.options.tools import DescribeRobot
 from idbench.experiments.identification.robot_model import RobotModel, absolute
 from idbench.experiments.judgement.warnings import FILE, warnings_of_robot
 from idbench.experiments.reports.budget import largest_torques
-from idbench.experiments.results.page import new_page
+from idbench.experiments.results.page import Page
 from idbench.experiments.text import new_table, print_titled
 from idbench.identify import Array, Basis
 from idbench.identify.basis.operations import COLUMNS, Operations, operations
@@ -28,7 +28,7 @@ MANY = 30  # Joints from which on a line says that grouping takes its time: it g
 
 def describe(options: DescribeRobot) -> None:
     """Show what can be identified of a robot."""
-    asked, page = with_own_parts(options), new_page(machine=options.json)
+    asked, page = with_own_parts(options), Page(machine=options.json)
     robot_model = RobotModel(absolute(asked.name), asked.parameters, asked.mounting.mounting)
     robot_model.require_laws()
     _ = robot_model.prior()

@@ -1,5 +1,6 @@
 """The command that simulates a scenario."""
 
+from contextlib import closing
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -21,7 +22,7 @@ from idbench.experiments.program import program
 from idbench.experiments.reports.estimates import models_in_full
 from idbench.experiments.reports.printed import print_fit
 from idbench.experiments.results.folder import ResultsFolder
-from idbench.experiments.results.page import Page, new_page, shown, stages_of
+from idbench.experiments.results.page import Page, stages_of
 from idbench.experiments.study.one_run import run_of
 from idbench.identify.files.log_file import write_log
 from idbench.sim.drives import ServoDrive
@@ -30,7 +31,7 @@ from idbench.sim.scenario.scenario import Scenario
 
 def run(options: RunCommand) -> None:
     """Simulate a scenario, identify it, save and record it."""
-    page, watching = new_page(machine=options.json), options.watching
+    page, watching = Page(machine=options.json), options.watching
     made = run_of(with_own_parts(options), lambda said: page.print(Text(said), soft_wrap=True))
     require_window(options.inner, watching)
     name = made.scenario.name
@@ -38,7 +39,7 @@ def run(options: RunCommand) -> None:
     folder = ResultsFolder(options.out or Path("runs") / name, "run", command, options.force, files_of(options))
     folder.check()
     made.require_bearable(options.yes)
-    with watching.audience() as audience, shown(page), folder.held():
+    with watching.audience() as audience, closing(page), folder.held():
         robot_model = made.request.robot_model
         recording = recording_of(made.scenario, audience, options.inner, robot_model) if watching.rerun else None
         with stages_of(name) as told:

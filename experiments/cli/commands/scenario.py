@@ -2,14 +2,14 @@
 
 from idbench.experiments.cli.options.tools import WriteScenario
 from idbench.experiments.program import program
-from idbench.experiments.results.page import new_page
+from idbench.experiments.results.page import Page
 from idbench.experiments.results.writing import require_free, write_text
 from idbench.sim.scenario.scenario_file import designed, load, names, to_toml
 
 
 def write(options: WriteScenario) -> None:
     """Write a scenario out, or list those that ship."""
-    page = new_page()
+    page = Page()
     if options.name is None:
         width = max(map(len, names()))
         for known in names():

@@ -1,6 +1,6 @@
 """The command that identifies servos."""
 
-from contextlib import nullcontext
+from contextlib import closing, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,7 +16,7 @@ from idbench.experiments.inputs import files_of
 from idbench.experiments.recording.audience import Audience
 from idbench.experiments.results.attempts import Attempts
 from idbench.experiments.results.folder import ResultsFolder
-from idbench.experiments.results.page import NOT_SAVED, Page, new_page, shown, stages_of
+from idbench.experiments.results.page import NOT_SAVED, Page, stages_of
 from idbench.experiments.results.writing import require_free, write_text
 from idbench.experiments.servo.identification import Servos
 from idbench.experiments.servo.job import ServosFit, servos_identified
@@ -39,13 +39,13 @@ if TYPE_CHECKING:
 
 def servo(options: IdentifyServo) -> None:
     """Identify servos."""
-    page, folder = new_page(machine=options.json), _folder(options)
+    page, folder = Page(machine=options.json), _folder(options)
     for option, path, ending in (("--write-mjcf", options.write_mjcf, ".xml"), ("--write", options.write, ".py")):
         if path is not None:
             if path.suffix != ending:
                 raise ExperimentError(f"{option} {path}: its name must end with {ending}")
             require_free(path, option, force=options.force, read=files_of(options))
-    with options.watching.audience() as audience, shown(page), folder.held() if folder else nullcontext():
+    with options.watching.audience() as audience, closing(page), folder.held() if folder else nullcontext():
         page.found |= {"experiment": "servo", "robot": absolute(str(options.robot)), "friction": options.friction, "joints": {}}
         made = _identified(page, folder, options)
         servos = made.servos
@@ -63,7 +63,7 @@ def servo(options: IdentifyServo) -> None:
             if options.write_mjcf is not None:
                 attempts.attempt("--write-mjcf", lambda: _write(page, options, servos, others, found))
                 attempts.attempt("summary.json", lambda: save_summary(page, folder))
-            attempts.file("report.html", lambda: _report(made, command_of(options, out=True)))
+            attempts.file("report.html", lambda: made.document().page(command_of(options, out=True)))
             if options.write is not None:
                 attempts.attempt("--write", lambda: _write_function(page, options, servos, found))
             if options.watching.rerun and (folder is not None or audience is not None):
@@ -127,12 +127,6 @@ def _write_function(page: Page, options: IdentifyServo, servos: Servos, found: d
     text = servo_function(Path(servos.robot).name, known, [log.name for log in servos.logs])
     write_text(path, text, "--write", force=options.force, read=files_of(options))
     page.print(Text(f"written to {path}: the servos as a Python file"), soft_wrap=True)
-
-
-def _report(made: ServosFit, command: str) -> str:
-    from idbench.experiments.reports.plain import page_of
-
-    return page_of(made.document(), command)
 
 
 def _recorded(servos: Servos, found: dict[str, ServoFit], audience: Audience | None) -> "Streams":

@@ -2,7 +2,7 @@
 
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -11,7 +11,7 @@ from idbench.experiments.errors import StudyError
 from idbench.experiments.program import program
 from idbench.experiments.recording.audience import Audience
 from idbench.experiments.results.folder import ResultsFolder
-from idbench.experiments.results.page import new_page, runs_of, shown
+from idbench.experiments.results.page import Page, runs_of
 from idbench.experiments.study.job import LARGEST_SHARD, runs_of_shard, store_of, worker_pool
 from idbench.experiments.study.run_study import run_missing
 from idbench.experiments.study.statistics import cells
@@ -28,7 +28,7 @@ def study(options: StudyCommand) -> None:
     watching = options.watching
     if watching.pace is not None:
         raise StudyError(f"--pace {watching.pace:g}: a study has no one time that could pass; leave it out")
-    page = new_page(machine=options.json)
+    page = Page(machine=options.json)
     if options.study is None and options.resume is None:
         width = max(map(len, names()))
         for name in names():
@@ -40,7 +40,7 @@ def study(options: StudyCommand) -> None:
     folder = ResultsFolder(store.folder, "study", f"idbench study {store.study.name}", options.force)
     folder.check()
     runs, pooled = runs_of_shard(options, store), worker_pool(options, store)
-    with watching.audience() as audience, shown(page), pooled as pool, store.held(), _kept(store):
+    with watching.audience() as audience, closing(page), pooled as pool, store.held(), _kept(store):
         recording = _recording(store, audience) if watching.rerun else None
         receive = partial(_show, store, recording) if recording and audience else None
         if pool is not None:

@@ -10,7 +10,7 @@ from idbench.experiments.errors import ExperimentError, ResultsError
 from idbench.experiments.recording.comparison_recording import compare
 from idbench.experiments.recording.folder import BASE, files, merge
 from idbench.experiments.recording.viewers import LOOPBACK, require_display, viewer_binary
-from idbench.experiments.results.page import new_page
+from idbench.experiments.results.page import Page
 from idbench.experiments.results.writing import new_file
 
 LATEST = Path("runs")  # Where the latest results are looked for
@@ -18,7 +18,7 @@ LATEST = Path("runs")  # Where the latest results are looked for
 
 def view(options: View) -> None:
     """Open a recording, or write it to one file."""
-    page, folders = new_page(), options.folders or (_latest(),)
+    page, folders = Page(), options.folders or (_latest(),)
     if not options.folders:
         page.print(f"the latest of {LATEST}: {folders[0]}", soft_wrap=True)
     if options.save is None:
