@@ -173,7 +173,7 @@ def checks(judgement: Judgement, *, delay: bool, trials: bool = True) -> dict[st
 
 
 def warnings_of_logs(judgement: Judgement) -> list[str]:
-    """Return what is suspicious about the logs, fitted and held out."""
+    """Doubts about the logs, fitted and held out."""
     logs, tree = judgement.fit.logs, judgement.fit.robot_model.tree
     several = len(logs.fitted) > 1
     every = [(f"{logs.name(k)}: " if several else "", log) for k, log in enumerate(logs.fitted)]

@@ -50,7 +50,7 @@ class LoadFit:
     """What logs with a payload and logs without it show: the payload, or the gains of the drives."""
 
     judgement: LoadJudgement
-    """The robot with its logs, to be judged; by the gains that were found."""
+    """The robot with its logs, read with the gains that were found."""
     found: Mapping[str, PayloadEstimate | str] | GainEstimate
     """The payload by the name of the way, or why that gives none; or the gains."""
     headline: str

@@ -211,7 +211,7 @@ def servo_methods(friction: str, axes: Sequence[Axis]) -> Iterator[Method]:
 
 
 def of_currents(method: Method) -> Method:
-    """Return what identifies the torque of servos' currents, in the place of what their closed loop is fitted with."""
+    """Method for the torque of servos' currents, in the place of that for their closed loop."""
     return replace(method, chain_name=CHAIN, estimator_name=ESTIMATOR, friction="standard", settings=())
 
 

@@ -64,7 +64,7 @@ def shard_header(path: Path) -> dict[str, str]:
 
 
 def damaged(path: Path, error: Exception) -> StudyError:
-    """Return what is to be metadata of a file that cannot be read."""
+    """Error of a shard that cannot be read."""
     return StudyError(f"{path} is damaged ({' '.join(str(error).split())}): remove it, and go on with --resume")
 
 

@@ -80,7 +80,7 @@ Links: TypeAlias = Callable[[KinematicTree, Mapping[Parameter, Term]], list[Term
 
 
 def _total(basis: Basis, state: State, X: Array, function: str, links: Links) -> Array:
-    """Return what all blocks add, shape (..., joint, time): links as `links` has it, others by their columns."""
+    """Sum over all blocks, shape (..., joint, time): links as `links` has it, others by their columns."""
     total = np.zeros(np.broadcast_shapes(state.q.shape, (*X.shape[:-1], 1, 1)))
     for block in basis.blocks:
         if isinstance(block, TreeLinks):

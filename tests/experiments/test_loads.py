@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from idbench.experiments.cli import main
-from idbench.experiments.errors import ExperimentError
+from idbench.experiments.errors import ExperimentError, ResultsError
 from idbench.experiments.loads.job import payload_of
 from idbench.experiments.loads.simulated import Pairs
 from idbench.experiments.requests.jobs import KnownOptions, PayloadRequest
@@ -170,6 +170,18 @@ def test_the_payload_command(files, capsys):
     report = (files / "found" / "report.html").read_text()
     assert "Result: " in report
     assert "payload, about the origin of the frame of joint6" in report
+
+
+def test_a_payload_is_shown_though_it_cannot_be_saved(files, capsys, monkeypatch):
+    def full(*_):
+        raise ResultsError("cannot write to found: No space left on device")
+
+    monkeypatch.setattr("idbench.experiments.cli.commands.loads.save_summary", full)
+    words = ["payload", "full.parquet", "--unloaded", "empty.parquet", "--robot", "puma560", "--estimator", "WLS"]
+    assert main([*words, "--out", "found"]) == 2
+    out, err = capsys.readouterr()
+    assert "payload, about the origin of the frame of joint6" in out
+    assert "No space left on device" in err
 
 
 @pytest.mark.thorough

@@ -74,12 +74,12 @@ def _identified(
 ) -> Iterator[Attempts]:
     """Show and save a fit, its verdict first, whatever ends the judging; give what tries to show it in other ways."""
     page.found |= {"path": str(options.log[0].absolute()), "log": options.log[0].name, **made.content}
-    save_summary(page, folder)
     with Attempts("the results are printed" + (f", and in {folder.out}" if folder else ""), folder) as attempts:
         try:
+            save_summary(page, folder)
             with stages_of("judging"):
                 document = attempts.attempt("the verdict", lambda: made.document)
-        except BaseException:
+        except BaseException:  # whatever ends it, what was found is worth keeping
             made.show(page)
             page.show()
             raise
