@@ -48,3 +48,19 @@ def test_replayed_columns_are_the_formulas_of_numbers(function, shape, rng):
         np.testing.assert_allclose(column, np.broadcast_to(plain[key], shape), rtol=1e-12, atol=1e-12)
     zero = {key for key, column in plain.items() if not np.any(column)}
     assert plain.keys() - found.keys() <= zero
+
+
+def test_stretches_of_a_motion_share_what_is_made_of_them_once():
+    """Large things once for each key in turn; nothing is left when the motion is told to forget."""
+    motion, made = State(np.zeros((2, 10)), np.ones((2, 10)), np.zeros_like), []
+
+    def counted(state):
+        made.append(state)
+        return len(made)
+
+    part, one, other = motion.part(slice(2, 5)), object(), object()
+    assert motion.part(slice(2, 5)) is part
+    assert part.qdd.shape == (2, 3)
+    assert [part.latest(key, counted) for key in (one, one, other, one)] == [1, 1, 2, 3]
+    motion.forget()
+    assert motion.part(slice(2, 5)) is not part
