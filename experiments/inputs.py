@@ -24,5 +24,5 @@ def files_of(asked: Any) -> tuple[Path, ...]:
                 path = Robot.path(each) if what == "robot" else file_of(each) if what == "log" else Path(each)
                 found[path.absolute()] = None
     if isinstance(asked, jobs.IdentifyRequest):  # that of the run, where none is named
-        found[Robot.path(robot_of(asked)).absolute()] = None
+        found[Robot.path(robot_of(asked).name).absolute()] = None
     return tuple(found)

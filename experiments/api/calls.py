@@ -61,7 +61,7 @@ def load_robot(robot: str | Path, **keys: Any) -> RobotModel:
     """
     asked = request_from(LogRequest, named(keys), "load_robot", taken=_others((Parameters, MountingOptions)))
     made = RobotModel(absolute(str(robot)), asked.parameters, asked.mounting.mounting)
-    _ = made.basis
+    made.check()
     return made
 
 
@@ -222,7 +222,7 @@ def _others(groups: Sequence[type], *, but: bool = False) -> set[str]:
 
 def _name_of(asked: jobs.IdentifyRequest) -> str:
     """Return the robot that is named, or that of the run, or the SCARA."""
-    return robot_of(asked) if asked.log else absolute(asked.robot or SCARA)
+    return robot_of(asked).name if asked.log else absolute(asked.robot or SCARA)
 
 
 def _require_logs(logs: Sequence[Any], held_out: Sequence[Any], keys: Mapping[str, Any]) -> None:

@@ -17,10 +17,10 @@ from idbench.experiments.identification.job import summary_of
 from idbench.experiments.identification.load import within
 from idbench.experiments.identification.reading import late, read
 from idbench.experiments.identification.robot_model import RobotModel
+from idbench.experiments.judgement.conclusion import Conclusion, conclusion
 from idbench.experiments.judgement.held_out import Verdict
 from idbench.experiments.judgement.judgement import Judgement, judge
 from idbench.experiments.judgement.remedies import checks
-from idbench.experiments.reports.estimates import conclusion
 from idbench.experiments.requests.shared import LogRequest
 from idbench.experiments.results.attempts import Attempts
 from idbench.experiments.results.writing import folder_for, write_text
@@ -130,15 +130,15 @@ class Identification:
         """What to check, by what it is about."""
         return checks(self.judgement, delay=self.delay_given)
 
-    @property
-    def answer(self) -> tuple[str, str]:
+    @cached_property
+    def answer(self) -> Conclusion:
         """The verdict on held-out data in a sentence, and the next step."""
         return conclusion(self.judgement, self.doubts)
 
     @property
     def verdict(self) -> str:
         """The verdict on held-out data in one sentence, and what to check first."""
-        return "; ".join(self.answer)
+        return str(self.answer)
 
     def predict(
         self, q: Array, qd: Array, qdd: Array, model: str | None = None, *, interval: float | None = None
@@ -269,7 +269,7 @@ class Identification:
     def _table(self) -> tuple[str, list[str], list[list[str]]]:
         known = self.fit.truth is not None
         heads = [f"{self.model} model", "value", "unit", "%sigma", *(["truth"] if known else [])]
-        return f"{self.fit.logs.title}, {self.fit.request.estimator}", heads, list(self._rows())
+        return f"{self.fit.logs.title}, {self.fit.request.method.estimator_name}", heads, list(self._rows())
 
     def _rows(self) -> Iterator[list[str]]:
         functions = {p.name for p in self.fit.basis.parameters if p.is_random_effect}

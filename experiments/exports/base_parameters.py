@@ -43,7 +43,7 @@ def json_text(fit: Fit, model: str) -> str:
         "about": ABOUT,
         "robot": robot_model.tree.name,
         "model": model,
-        "estimator": fit.request.estimator,
+        "estimator": fit.request.method.estimator_name,
         "logs": list(fit.logs.names),
         "parameters": parameters,
         "covariance": np.asarray(estimate.covariance).tolist(),

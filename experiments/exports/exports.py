@@ -41,7 +41,7 @@ class Exported:
 def origin(fit: Fit, model: str) -> str:
     """What a file is from, in a sentence."""
     logs = ", ".join(fit.logs.names) or "a log"
-    return f"identified from {logs} by {fit.request.estimator} of the {model} model, idbench {version('idbench')}"
+    return f"identified from {logs} by {fit.request.method.estimator_name} of the {model} model, idbench {version('idbench')}"
 
 
 def _marked(text: str, fit: Fit, model: str) -> str:

@@ -13,7 +13,6 @@ from idbench.experiments.identification.request import Request
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.results.writing import finite, summarize
 from idbench.identify import (
-    AbstractEstimator,
     Array,
     Basis,
     Chain,
@@ -66,11 +65,6 @@ class Fit:
     def processing(self) -> Chain:
         """The chain."""
         return self.problem.chain
-
-    @property
-    def solver(self) -> AbstractEstimator:
-        """The estimator."""
-        return self.request.solver
 
     @cached_property
     def diagnosis(self) -> tuple[Cause, ...] | None:
@@ -212,8 +206,8 @@ class Fit:
             "made_of": self.robot_model.grouping.groupings,
             "truth": truth,
             "robot": self.robot_model.name,
-            "chain": self.request.chain,
-            "estimator": self.request.estimator,
+            "chain": self.request.method.chain_name,
+            "estimator": self.request.method.estimator_name,
             "torque": self._channel(0),
             "reversals_left_out": self.left_out,
             "found_delay": None if delay is None else {"delay": delay[0], "sigma": delay[1]},

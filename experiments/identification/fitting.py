@@ -78,7 +78,7 @@ def fit(request: Request, logs: Logs) -> Fit:
 def _shown(request: Request, logs: Logs, problem: Problem) -> Fit:
     """Return the fit of the parameters that the logs show: those that the leading model finds hidden are left out."""
     models = {name: MODELS.create(name) for name in request.models}
-    found = Fit(request, logs, problem, attempt_each(problem, models, request.solver))
+    found = Fit(request, logs, problem, attempt_each(problem, models, request.method.estimator))
     leading = next(iter(found.outcomes.values()))
     if not isinstance(leading, ExcitationError) or not 0 < len(leading.hidden) < len(found.basis.names):
         return found
@@ -116,7 +116,7 @@ def _errors(before: Fit, after: Fit) -> tuple[float, float]:
 
 def _with_its_cause(found: Fit, error: IdentificationError) -> IdentificationError:
     """The error, completed by its cause, with the residuals of least squares, if they depend on the motion."""
-    if isinstance(error, ExcitationError) or found.solver.filtered:
+    if isinstance(error, ExcitationError) or found.request.method.estimator.filtered:
         return error
     try:
         suspects = diagnosed(found.problem, ESTIMATORS.create("GLS").fit(found.problem.explicit).X)

@@ -20,7 +20,7 @@ def words_of_iterations(fit: Fit) -> Iterator[str]:
         if estimate.simulations is None:
             continue
         yield f"{model}: converged after {int(estimate.simulations)} simulations"
-        if isinstance(fit.solver, InstrumentalVariables):
+        if isinstance(fit.request.method.estimator, InstrumentalVariables):
             test = noise_in_rows(estimate)
             k = int(np.argmax(np.abs(test.off)))
             yield (
@@ -30,7 +30,7 @@ def words_of_iterations(fit: Fit) -> Iterator[str]:
                 + f" (Durbin-Wu-Hausman: chi2 = {test.statistic:.3g}, {int(test.freedom)} degrees of freedom, "
                 f"p = {test.probability:.2g})"
             )
-        elif "loop" in fit.solver.needs:
+        elif "loop" in fit.request.method.estimator.needs:
             yield from _far_from_least_squares(fit, model, estimate)
 
 
@@ -43,7 +43,8 @@ def _far_from_least_squares(fit: Fit, model: str, estimate: Estimate) -> Iterato
         k = int(np.nanargmax(off))
         yield (
             f"{model}: {fit.basis.names[k]} is {off[k]:.2g} sigma away from least squares of the measured motion: either "
-            f"noise in W matters, or the loop is not that of the log, on which {fit.request.estimator} relies; IV does not"
+            "noise in W matters, or the loop is not that of the log, on which "
+            f"{fit.request.method.estimator_name} relies; IV does not"
         )
 
 
@@ -54,7 +55,7 @@ def iterations(fit: Fit) -> dict[str, Any]:
         model: {
             "simulations": None if e.simulations is None else int(e.simulations),
             "path": [[finite(x) for x in X] for X in e.path],
-            **({"noise_in_W": _test(e)} if isinstance(fit.solver, InstrumentalVariables) else {}),
+            **({"noise_in_W": _test(e)} if isinstance(fit.request.method.estimator, InstrumentalVariables) else {}),
         }
         for model, e in every.items()
     }

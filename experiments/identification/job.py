@@ -15,13 +15,14 @@ from idbench.experiments.identification.iterations import iterations
 from idbench.experiments.identification.load import Loaded, in_band, load, with_held_out
 from idbench.experiments.identification.log_warnings import unchanging, warnings_of_log
 from idbench.experiments.identification.logs import Logs
+from idbench.experiments.identification.method import Method
 from idbench.experiments.identification.rates import CONTROLLER
 from idbench.experiments.identification.reading import file_of, stated_by
 from idbench.experiments.identification.request import Request
-from idbench.experiments.identification.robot_model import SCARA, RobotModel, absolute
+from idbench.experiments.identification.robot_model import ASSUMED, SCARA, RobotModel, absolute
 from idbench.experiments.requests.jobs import IdentifyRequest
 from idbench.experiments.requests.shared import CHAIN
-from idbench.identify import ESTIMATORS, MODELS, IdentificationError
+from idbench.identify import MODELS, IdentificationError
 from idbench.identify.models import THREE
 from idbench.identify.signals.masks import NoMask
 from idbench.sim.scenario.scenario_file import load as load_scenario
@@ -48,17 +49,16 @@ def request_of(asked: IdentifyRequest, robot_model: RobotModel | None = None) ->
     own = [path / "scenario.toml" for path in asked.log]
     loops = asked.loop or ([str(own[0])] if len(own) == 1 and own[0].is_file() else [])
     request = Request(
-        robot_model or RobotModel(robot_of(asked), asked.parameters, asked.mounting.mounting),
+        robot_model or robot_of(asked),
         THREE if asked.model is None else tuple(MODELS) if asked.model == "all" else (asked.model,),
-        asked.chain,
-        asked.estimator,
+        Method.named(asked.chain, asked.estimator),
         name=asked.label,
         loops=tuple(map(load_scenario, loops)),
         start=asked.start,
         mask_speed=asked.mask_speed,
         wdyn=_wdyn(asked.wdyn, own),
     )
-    if asked.loop and "loop" not in request.solver.needs:
+    if asked.loop and "loop" not in request.method.estimator.needs:
         raise ExperimentError(
             f"--loop: {asked.estimator} simulates no loop; leave it out, or use --estimator IV, DIDIM, CLIE or CLOE"
         )
@@ -73,14 +73,10 @@ def _wdyn(stated: float | None, scenarios: Sequence[Path]) -> tuple[float, str] 
     return None if found is None else (found, CONTROLLER)
 
 
-def robot_of(asked: IdentifyRequest) -> str:
-    """Return the robot that is named, or that of the run."""
-    return str(stated_by(asked.log[0]).get("robot", SCARA)) if asked.robot is None else absolute(asked.robot)
-
-
-def assumes_the_robot(asked: IdentifyRequest) -> bool:
-    """True if nobody says of which robot the log is: neither a request nor the folder of a run."""
-    return asked.robot is None and "robot" not in stated_by(asked.log[0])
+def robot_of(asked: IdentifyRequest) -> RobotModel:
+    """Return the robot that is named, or that of the run; the shipped SCARA where neither says it."""
+    known = stated_by(asked.log[0]).get("robot") if asked.robot is None else absolute(asked.robot)
+    return RobotModel(str(known or SCARA), asked.parameters, asked.mounting.mounting, assumed=known is None)
 
 
 def read_logs(asked: IdentifyRequest, request: Request) -> Loaded:
@@ -115,7 +111,8 @@ def notes_of(made: Fit) -> tuple[str, ...]:
     """Notes on reading and assumptions, and the chosen laws of friction."""
     robot_model, choice = made.robot_model, made.choice
     laws = () if choice is None else words(choice, robot_model.laws.names, robot_model.robot.joints)
-    return (*made.logs.notes, *(f"the robot's file has {note}" for note in robot_model.robot.notes), *laws)
+    assumed = (ASSUMED,) if robot_model.assumed else ()
+    return (*made.logs.notes, *(f"the robot's file has {note}" for note in robot_model.robot.notes), *laws, *assumed)
 
 
 def truth_of(asked: IdentifyRequest, request: Request) -> dict[str, float] | None:
@@ -135,10 +132,10 @@ def _with_chain(asked: IdentifyRequest, request: Request) -> Request:
         raise ExperimentError("--cutoff and --chain-file both say the band: give one")
     if asked.chain_file is not None:
         name, chain = chain_of(asked.chain_file)
-        return replace(request, chain=name, method=(chain, ESTIMATORS.create(request.estimator)))
+        return request.with_chain(chain, name)
     if request.robot_model.asked.armature == "none" and asked.chain == CHAIN and not asked.mask_speed:
         # Behind the gears next to no friction is left that turns with the velocity: nothing to mask.
-        request = replace(request, method=(replace(request.processing, mask=NoMask()), request.solver))
+        request = request.with_chain(replace(request.method.chain, mask=NoMask()))
     return request if asked.cutoff is None else in_band(request, asked.cutoff)
 
 

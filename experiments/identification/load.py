@@ -189,10 +189,11 @@ def prepared(
         p, least = len(request.robot_model.basis.names) + more, request.processing.operator.cutoff  # type: ignore[attr-defined]
         needed = Band.of(logs, p, least)
         if needed.cutoff != least:
-            mask, of_band = request.processing.mask, [needed.words(p, least)]
+            before = request.method.chain
+            of_band = [needed.words(p, least)]
             request = in_band(request, needed.cutoff)
             if needed.cutoff < least:  # edges of a mask that are as long as a slow log's moves would leave nothing
-                request = replace(request, method=(replace(request.processing, mask=mask), request.solver))
+                request = request.with_chain(replace(request.method.chain, mask=before.mask))
     if sought:
         with stage("the delay of the torques"):
             own = with_delays(every[:alike], request, sought)
@@ -206,7 +207,7 @@ def prepared(
 
 def in_band(request: Request, cutoff: float) -> Request:
     """Return a request with the band up to `cutoff` [Hz]."""
-    return replace(request, method=(with_cutoff(request.processing, cutoff), request.solver))
+    return request.with_chain(with_cutoff(request.method.chain, cutoff))
 
 
 def with_held_out(loaded: Loaded, asked: IdentifyRequest, truth: Mapping[str, float] | None) -> Logs:

@@ -79,7 +79,7 @@ def of_poses(request: Request, logs: Sequence[MotionLog], *, band: bool, sought:
     if sought:
         raise ExperimentError(f"--torque-delay {sought}: poses at rest show no delay; leave it out")
     models = ("explicit",) if len(request.models) > 1 else request.models  # at rest all have its equations, or none
-    request = replace(request, chain=POSES, method=(poses_chain(), request.solver), models=models)
+    request = replace(request.with_chain(poses_chain(), POSES), models=models)
     size = np.linalg.norm(request.problem(logs).factors.R[..., :-1], axis=(0, 1))
     unseen = [name for name, x in zip(request.robot_model.basis.names, size, strict=True) if x <= NOTHING * size.max()]
     return replace(request, robot_model=request.robot_model.without(unseen)) if len(unseen) < len(size) else request

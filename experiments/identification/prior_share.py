@@ -19,7 +19,7 @@ def chosen_share(request: Request, logs: Sequence[MotionLog]) -> float | None:
     """
     problem = request.problem(logs)
     try:
-        found = estimate(problem, request.solver)
+        found = estimate(problem, request.method.estimator)
     except IdentificationError:
         return None
     rows = None if found.solution is None else found.solution.independent(problem.parts)

@@ -172,8 +172,8 @@ def with_delays(every: Sequence[ReadLog], request: Request, sought: str) -> list
     """Return logs with the delay of their torques, `sought` of `DELAYS`, from all that have the same meaning together."""
     if isinstance(request.processing.alignment, AsLogged):
         raise ExperimentError(
-            f"--torque-delay {sought}: --chain {request.chain} takes torques as they were logged and reads no delay: "
-            "leave one of the two out"
+            f"--torque-delay {sought}: --chain {request.method.chain_name} takes torques as they were logged and reads no "
+            "delay: leave one of the two out"
         )
     found, unknown = dict[str, DelayEstimate](), dict[str, str]()
     for meaning in {log.logs[0].torque.meaning for log in every}:

@@ -2,20 +2,18 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import Self
 
 import numpy as np
 
 from idbench.experiments.errors import ExperimentError
+from idbench.experiments.identification.method import Method
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.identification.simulators import RobotPlant, ScenarioLoop
 from idbench.experiments.identification.smooth_friction import places_of, prior_of, sizes_of
-from idbench.experiments.requests.shared import CHAIN, ESTIMATOR
 from idbench.experiments.requests.words import Start
 from idbench.identify import (
-    CHAINS,
-    ESTIMATORS,
     MODELS,
-    AbstractEstimator,
     Basis,
     Chain,
     ExplicitModel,
@@ -46,14 +44,8 @@ class Request:
     """The robot."""
     models: tuple[str, ...] = THREE
     """Names of the models."""
-    chain: str = CHAIN
-    """Name of the chain."""
-    estimator: str = ESTIMATOR
-    """Name of the estimator."""
-    method: tuple[Chain, AbstractEstimator] | None = None
-    """Both with settings of their own, instead of those that have the names."""
-    trim: float | None = None
-    """Time at either end of a log that makes no rows [s]; by default what the chain needs."""
+    method: Method = field(default_factory=Method.named)
+    """Chain and estimator."""
     name: str = ""
     """What to call it beside others of the same log; by default chain and estimator."""
     loops: tuple[Scenario, ...] = ()
@@ -76,45 +68,47 @@ class Request:
     def __post_init__(self) -> None:
         if self.wdyn is not None and not 0 < self.wdyn[0] < np.inf:
             raise ExperimentError(f"--wdyn {self.wdyn[0]:g} must be above 0 [Hz], and finite")
-        _ = self.robot_model.basis, self.processing, self.solver, [MODELS.create(name) for name in self.models]
+        self.robot_model.check()
+        method = self.method
+        for name in self.models:
+            MODELS.create(name)
         n, given = self.robot_model.robot.n, " ".join(f"{x:g}" for x in self.mask_speed)
         if self.mask_speed and not isinstance(self.processing.mask, ReversalMask):
-            raise ExperimentError(f"--mask-speed {given}: --chain {self.chain} with these options masks nothing; leave it out")
+            raise ExperimentError(
+                f"--mask-speed {given}: --chain {method.chain_name} with these options masks nothing; leave it out"
+            )
         if len(self.mask_speed) not in (0, 1, n) or not all(0 < x < np.inf for x in self.mask_speed):
             raise ExperimentError(f"--mask-speed {given} must be one speed above 0 for all {n} joints, or one for each")
         laws = self.robot_model.laws
         rough = "--prior" if self.robot_model.asked.prior else "--friction smooth" if laws.smooth else ""
-        if rough and not self.solver.takes_prior:
+        if rough and not method.estimator.takes_prior:
             raise ExperimentError(
-                f"{rough}: {self.estimator} takes nothing that is known before; use --estimator GLS, WLS or OLS, or --hold"
+                f"{rough}: {method.estimator_name} takes nothing that is known before; use --estimator GLS, WLS or OLS, "
+                "or --hold"
             )
-        if self.robot_model.asked.prior:
-            _ = self.robot_model.prior()
-        if self.start != "least-squares" and not self.solver.begins:
+        if self.start != "least-squares" and not method.estimator.begins:
             raise ExperimentError(
-                f"--start {self.start}: {self.estimator} needs no start; leave it out, or use --estimator IV or DIDIM"
+                f"--start {self.start}: {method.estimator_name} needs no start; leave it out, or use --estimator IV or DIDIM"
             )
 
     @property
     def processing(self) -> Chain:
-        """The chain."""
-        chain = self.method[0] if self.method else CHAINS.create(self.chain)
-        if isinstance(chain.mask, ReversalMask):
-            couplings = tuple(c.weights for c in self.robot_model.tree.couplings)
-            threshold, reach = self.mask_speed or chain.mask.threshold, self.mask_reach or chain.mask.reach
-            mask = replace(chain.mask, couplings=couplings, threshold=threshold, reach=reach)
-            chain = replace(chain, mask=mask)
-        return chain if self.trim is None else replace(chain, trim=self.trim)
+        """The chain, with the mask of this robot and these speeds."""
+        chain = self.method.chain
+        if not isinstance(chain.mask, ReversalMask):
+            return chain
+        couplings = tuple(c.weights for c in self.robot_model.tree.couplings)
+        threshold, reach = self.mask_speed or chain.mask.threshold, self.mask_reach or chain.mask.reach
+        return replace(chain, mask=replace(chain.mask, couplings=couplings, threshold=threshold, reach=reach))
 
-    @property
-    def solver(self) -> AbstractEstimator:
-        """The estimator."""
-        return self.method[1] if self.method else ESTIMATORS.create(self.estimator)
+    def with_chain(self, chain: Chain, name: str = "") -> Self:
+        """The same with another chain, which starts from that of a name."""
+        return replace(self, method=replace(self.method, chain=chain, chain_name=name or self.method.chain_name))
 
     @property
     def label(self) -> str:
         """What distinguishes this identification from others of the same log."""
-        return self.name or f"{self.chain}-{self.estimator}"
+        return self.name or f"{self.method.chain_name}-{self.method.estimator_name}"
 
     def problem(self, logs: Sequence[MotionLog]) -> Problem:
         """Return logs, robot and chain, by the explicit model; nonlinear parameters at their operating point."""
@@ -133,7 +127,7 @@ class Request:
 
     def _simulation(self, logs: tuple[MotionLog, ...]) -> Simulation:
         """Simulation of the robot, for estimators that need it."""
-        needs, robot_model = self.solver.needs, self.robot_model
+        needs, robot_model = self.method.estimator.needs, self.robot_model
         start = None if self.start == "least-squares" else np.array(list(robot_model.truth(robot_model.robot).values()))
         loop = ScenarioLoop.of(robot_model, self.loops, logs) if "loop" in needs and self.loops else None
         return Simulation(loop, RobotPlant(robot_model) if "plant" in needs else None, start)

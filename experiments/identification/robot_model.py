@@ -35,6 +35,7 @@ from idbench.sim.robot.tree import kinematic_tree, standard_parameters
 from idbench.sim.robot.varied import model_fields
 
 SCARA = "scara"  # The robot of the paper, which is taken where none is named
+ASSUMED = f"no --robot was given, the shipped {SCARA} is assumed"
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +48,8 @@ class RobotModel:
     """Which of its parameters are asked for."""
     mounting: Mounting = PLAIN
     """How it is mounted, and which of its joints move."""
+    assumed: bool = False
+    """Whether nobody says of which robot the log is."""
 
     def __repr__(self) -> str:
         return text_table(*self._table())
@@ -94,6 +97,11 @@ class RobotModel:
         if not self.asked.prior:
             return None
         return self.roughly_known.prior(self.grouping, self.basis, self.filed, share)
+
+    def check(self) -> Basis:
+        """Return the basis; raise ExperimentError or IdentificationError if laws, priors or known parameters are of none."""
+        self.prior()
+        return self.basis
 
     @cached_property
     def given(self) -> dict[str, float]:

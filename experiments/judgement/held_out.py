@@ -205,6 +205,14 @@ class HeldOut:
             for model, validation in self.torques.items()
         }
 
+    @property
+    def alike(self) -> dict[tuple[str, str], list[str]]:
+        """The verdicts, word and reasons, with the models that have them."""
+        found: dict[tuple[str, str], list[str]] = {}
+        for model, verdict in self.verdicts.items():
+            found.setdefault((verdict.word, "; ".join(verdict.reasons)), []).append(model)
+        return found
+
     def driven(self, model: str) -> tuple[Robot, MotionLog, Array]:
         """Return the robot with a model's parameters, what drives it, and velocities of the log [rad/s].
 

@@ -6,7 +6,7 @@ from typing import Any
 
 from idbench.experiments.errors import is_told, reason, trace
 from idbench.experiments.identification.fit import Fit
-from idbench.experiments.judgement.held_out import WORDS, HeldOut, on_last_quarter, on_log
+from idbench.experiments.judgement.held_out import WORDS, HeldOut, Verdict, on_last_quarter, on_log
 
 
 @dataclass(frozen=True)
@@ -48,6 +48,11 @@ class Judgement:
     def hardest(self) -> HeldOut | None:
         """The held-out log on which the leading model does worst; None if it was judged on none."""
         return max(self.held_out, key=_place, default=None)
+
+    @property
+    def verdict(self) -> Verdict | None:
+        """The verdict on the leading model on the hardest held-out log; None if there is no such log."""
+        return None if self.hardest is None else self.hardest.verdicts[self.hardest.fit.leading]
 
     @property
     def good(self) -> bool:

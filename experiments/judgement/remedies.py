@@ -115,7 +115,7 @@ def _others(held_out: HeldOut) -> dict[str, Callable[[], RobotModel]]:
     mounting = robot_model.mounting
     joints = robot_model.robot.joints
     known = asked.prior or "links=file" in asked.hold
-    if not known and request.solver.takes_prior and not robot_model.basis.is_nonlinear:  # which takes minutes
+    if not known and request.method.estimator.takes_prior and not robot_model.basis.is_nonlinear:  # which takes minutes
         found["--prior file"] = lambda: replace(robot_model, asked=replace(asked, prior=("file",)))
     if not all(joint.armature for joint in robot_model.tree.joints):
         found["--armature all"] = lambda: replace(robot_model, asked=replace(asked, armature="all"))
@@ -135,8 +135,8 @@ def _worst(held_out: HeldOut, request: Request) -> float:
     if request.robot_model.share_sought:
         request = replace(request, share=chosen_share(request, held_out.fit.logs.fitted))
     problem = request.problem(held_out.fit.logs.fitted)
-    simulates = {"loop", "plant"} & request.solver.needs  # which takes far too long to try with
-    X = estimate(problem, WeightedLeastSquares() if simulates else request.solver).X
+    simulates = {"loop", "plant"} & request.method.estimator.needs  # which takes far too long to try with
+    X = estimate(problem, WeightedLeastSquares() if simulates else request.method.estimator).X
     unseen = replace(held_out, fit=replace(held_out.fit, request=request, problem=problem)).problem
     return float(np.nanmax(validate(unseen, X).percent))
 

@@ -16,6 +16,7 @@ from idbench.experiments.document import Document, Listing
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.friction_choice import chosen_friction, words
 from idbench.experiments.identification.load import in_band, load
+from idbench.experiments.identification.method import Method
 from idbench.experiments.identification.request import Request
 from idbench.experiments.identification.robot_model import RobotModel, absolute
 from idbench.experiments.loads.known_load import LoadJudgement, payload_parameters
@@ -178,7 +179,9 @@ def _loaded(asked: LoadRequest) -> tuple[LoadJudgement, tuple[str, ...]]:
         raise ExperimentError("--robot is missing: the file that describes the arm, or the name of one that ships")
     known = payload_parameters(asked.known.mass, asked.known.at, asked.known.inertia)
     robot_model = RobotModel(absolute(asked.robot), asked.parameters, asked.mounting.mounting)
-    request = Request(robot_model, models=("explicit",), estimator=asked.estimator, mask_speed=asked.mask_speed)
+    request = Request(
+        robot_model, models=("explicit",), method=Method.named(estimator=asked.estimator), mask_speed=asked.mask_speed
+    )
     if asked.cutoff is not None:
         request = in_band(request, asked.cutoff)
     paths, band = (*asked.unloaded, *asked.log), asked.cutoff is None
@@ -192,7 +195,7 @@ def _loaded(asked: LoadRequest) -> tuple[LoadJudgement, tuple[str, ...]]:
         notes += words(choice, request.robot_model.laws.names, robot_model.robot.joints)
     robot_model = request.robot_model
     standard = robot_model.grouping.standard
-    robot = LoadedRobot(robot_model.tree, standard, without, with_it, request.processing, request.solver, known)
+    robot = LoadedRobot(robot_model.tree, standard, without, with_it, request.processing, request.method.estimator, known)
     gain = np.array(loaded.read[-1].columns.gain or 1.0)
     return LoadJudgement(robot, request, loaded.names, gain, _gains_command(asked)), tuple(notes)
 

@@ -18,6 +18,7 @@ from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.fit import Fit
 from idbench.experiments.identification.fitting import fit
 from idbench.experiments.identification.logs import Logs
+from idbench.experiments.identification.method import Method
 from idbench.experiments.identification.request import Request
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.paper.attribution import Attribution, Errors
@@ -121,7 +122,8 @@ class Table2:
     def _identified(self, processing: str, model: str) -> Fit:
         logs = tuple(self.run.alone(i) for i in range(REALIZATIONS[model]))
         chain, estimator = PROCESSINGS[processing]
-        request = Request(RobotModel(self.scenario.robot), (model,), chain, estimator, trim=self.rest)
+        method = Method.named(chain, estimator).trimmed(self.rest)
+        request = Request(RobotModel(self.scenario.robot), (model,), method)
         return fit(request, Logs(logs, truth=self.truth))
 
     @property

@@ -13,6 +13,7 @@ from rerun.chunk import Chunk, RrdReader
 from idbench.experiments.errors import ResultsError
 from idbench.experiments.identification.fitting import fit
 from idbench.experiments.identification.logs import Logs
+from idbench.experiments.identification.method import Method
 from idbench.experiments.identification.request import Request
 from idbench.experiments.paper.table1 import Table1, table1_markdown
 from idbench.experiments.paper.table2 import PAPER, Table2
@@ -48,7 +49,7 @@ def record_table1(table: Table1, audience: Audience | None = None) -> list[tuple
     base.finish(table1_markdown(table))
     streams = [(BASE, base.stream)]
     for chain in table.chains:
-        request = Request(chain=chain, estimator="OLS", trim=scenario.quintic().rest)
+        request = Request(method=Method.named(chain, "OLS").trimmed(scenario.quintic().rest))
         result = fit(request, Logs((log,), truth=table.truth))
         known = set().union(*(stream.paths for _, stream in streams))
         streams.append(Layer(base.stream.name, result, table.robot.joints, known, audience).send())

@@ -54,7 +54,7 @@ def noise_table(fit: Fit, joints: Sequence[str]) -> str:
 
 
 def _title(fit: Fit) -> str:
-    return f"Chain **{fit.request.chain}**, {fit.request.estimator}"
+    return f"Chain **{fit.request.method.chain_name}**, {fit.request.method.estimator_name}"
 
 
 DRAWN = {

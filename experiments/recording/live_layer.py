@@ -10,6 +10,7 @@ import rerun as rr
 from idbench.experiments.errors import reason, report
 from idbench.experiments.identification.fitting import fit
 from idbench.experiments.identification.logs import Logs
+from idbench.experiments.identification.method import Method
 from idbench.experiments.identification.request import Request
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.recording.columns import part, seconds
@@ -55,7 +56,7 @@ class LiveIdentification:
         self._stream = stream
         self._channel = channel
         self._fs = fs
-        self._request = Request(robot_model, chain=chain, estimator=ESTIMATOR, name=LABEL)
+        self._request = Request(robot_model, method=Method.named(chain, ESTIMATOR), name=LABEL)
         self._joints = joints
         self._q = list[Array]()
         self._tau = list[Array]()

@@ -1,19 +1,15 @@
 """The table of estimates: made once, for the screen, the page of a report and a recording."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import isfinite
 
 import numpy as np
 
-from idbench.experiments.identification.causes import Cause
 from idbench.experiments.identification.fit import Fit
-from idbench.experiments.judgement.held_out import FAIR, GOOD, HeldOut, Verdict
-from idbench.experiments.judgement.judgement import Judgement
-from idbench.experiments.judgement.warnings import DELAY, FLAGS, LOG, doubtful, used
-from idbench.experiments.note import noted
-from idbench.experiments.text import WORTHLESS, error_percentage, number, percent, relative, with_unit
+from idbench.experiments.judgement.warnings import FLAGS, doubtful, used
+from idbench.experiments.text import WORTHLESS, number, percent, relative, with_unit
 from idbench.identify import Estimate
 from idbench.identify.arrays import TINY, Array
 from idbench.identify.tables import concise
@@ -139,63 +135,3 @@ def explained(share: Array) -> str:
     known = 100 * share[np.isfinite(share)]
     each = [f"{max(x, 0):.3f}" for x in (known.min(), known.max())] if known.size else []
     return f"{' to '.join(dict.fromkeys(each))} %" if each else "nothing"
-
-
-def conclusion(judgement: Judgement, warnings: Mapping[str, Sequence[str]]) -> tuple[str, str]:
-    """Return one sentence on the hardest held-out log, and the next step.
-
-    What is wrong with the log, and has an option that mends it, comes before mistakes of the model: it may cause them.
-    """
-    of_log = next((warning for warning in warnings.get(LOG, ()) if noted(warning).option), "")
-    first = next((found[0] for found in warnings.values() if found), "")
-    late = next((option for warning in warnings.get(DELAY, ()) if (option := noted(warning).option)), "")
-    if late and (causes := judgement.fit.diagnosis) and causes[0].suspect.cause == "delay":
-        return _found(judgement, causes), f"next: {late}"
-    return _found(judgement, [] if of_log else judgement.fit.diagnosis or []), _next(judgement, of_log, first)
-
-
-def verdict_on(judgement: Judgement) -> Verdict | None:
-    """Return the verdict on the leading model on the hardest held-out log; None if there is no such log."""
-    one = judgement.hardest
-    return None if one is None else one.verdicts[one.fit.leading]
-
-
-def alike(one: HeldOut) -> dict[tuple[str, str], list[str]]:
-    """Return the verdicts on a held-out log, word and reasons, with the models that have them."""
-    found: dict[tuple[str, str], list[str]] = {}
-    for model, verdict in one.verdicts.items():
-        found.setdefault((verdict.word, "; ".join(verdict.reasons)), []).append(model)
-    return found
-
-
-def _found(judgement: Judgement, causes: Sequence[Cause]) -> str:
-    one, verdict = judgement.hardest, verdict_on(judgement)
-    if one is None or verdict is None:
-        return "Result: not validated"
-    model = one.fit.leading
-    if verdict.wrong:
-        return f"Result: {verdict.word} ({model} model): {verdict.wrong[0].finding}"
-    worst = float(np.nanmax(np.nan_to_num(one.torques[model].percent, nan=0.0, posinf=np.inf)))
-    beyond = float(np.nanmax(np.nan_to_num(one.torques[model].percent_of_level(one.torques[model].excess), posinf=np.inf)))
-    most = {"good": GOOD, "fair": FAIR}.get(verdict.word, np.inf)
-    noisy = f", {error_percentage(beyond)} beyond noise and sigma," if beyond < most < worst else ""
-    off = f"torque errors of at most {error_percentage(worst)}{noisy}"
-    found = f"Result: {verdict.word} ({model} model), {off} on {one.title.finding}"
-    return "; ".join([found, *(cause.words for cause in causes[:1])])
-
-
-def _next(judgement: Judgement, of_log: str, first: str) -> str:
-    """Next step: about the log, then the proved remedy of the first mistake, else the first doubt."""
-    if of_log:
-        return f"next: {of_log}"
-    for cause in judgement.fit.diagnosis or ():
-        return f"next: {cause.mends}"
-    if first:
-        return f"next: {first}"
-    if judgement.good:
-        return "next: --write arm.urdf arm.json arm.py keeps the robot"
-    if judgement.fit.logs.fitted[0].poses:
-        return "next: more poses"
-    asked = judgement.fit.request.robot_model.asked.friction
-    law = "" if judgement.fit.choice is not None or asked != ("standard",) else ", or another law of friction (--friction auto)"
-    return f"next: a longer or more exciting motion (idbench excite){law}"

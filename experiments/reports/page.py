@@ -11,10 +11,11 @@ from typing import Any, TypeVar
 import numpy as np
 
 from idbench.experiments.identification.fit import Fit
+from idbench.experiments.judgement.conclusion import Conclusion
 from idbench.experiments.judgement.held_out import HeldOut
 from idbench.experiments.judgement.judgement import Judgement, Unjudged
 from idbench.experiments.judgement.warnings import WEAK, doubtful
-from idbench.experiments.reports.estimates import EstimatesTable, alike, verdict_on
+from idbench.experiments.reports.estimates import EstimatesTable
 from idbench.experiments.reports.figures import (
     causes_figure,
     color_of,
@@ -93,7 +94,7 @@ LONGEST = 20  # Correlations that are listed, the strongest ones
 
 def report(
     judgement: Judgement,
-    answer: tuple[str, str],
+    answer: Conclusion,
     warnings: Mapping[str, Sequence[str]],
     notes: Sequence[str],
     command: str,
@@ -109,9 +110,10 @@ def report(
         "idbench.experiments.reports",
         "identify.html.j2",
         title=f"{robot_model.tree.name}: {fit.logs.title}",
-        subtitle=f"{robot_model.tree.n} joints, {len(fit.basis.names)} parameters, {fit.request.estimator}",
+        subtitle=f"{robot_model.tree.n} joints, {len(fit.basis.names)} parameters, {fit.request.method.estimator_name}",
         warnings={about: messages for about, messages in warnings.items() if messages},
-        **_of_judgement(judgement, answer, attempts),
+        answer=answer,
+        **_of_judgement(judgement, attempts),
         **_of_estimates(fit),
         causes=_figure(attempts, "causes", causes_figure, fit),
         friction=_figure(attempts, "friction", friction_figure, fit),
@@ -125,20 +127,16 @@ def report(
         today=date.today().isoformat(),
         version=version("idbench"),
         robot=robot_model.name,
-        chain=fit.request.chain,
+        chain=fit.request.method.chain_name,
         cutoff="" if cutoff is None else f"{cutoff:g} Hz",
-        estimator=fit.request.estimator,
+        estimator=fit.request.method.estimator_name,
     )
 
 
-def _of_judgement(judgement: Judgement, answer: tuple[str, str], attempts: Attempts) -> dict[str, Any]:
-    """Return verdict, next step, and the held-out logs."""
-    hardest, on_best = judgement.hardest, verdict_on(judgement)
-    verdict, step = answer
+def _of_judgement(judgement: Judgement, attempts: Attempts) -> dict[str, Any]:
+    """Return verdicts and the held-out logs."""
+    hardest = judgement.hardest
     return {
-        "verdict": verdict,
-        "step": step,
-        "word": on_best.word if on_best else "unsure",
         "verdicts": [] if hardest is None else list(_verdicts(hardest)),
         "unjudged": "; ".join(one.why for one in judgement.on if isinstance(one, Unjudged)),
         "failures": judgement.fit.failures,
@@ -168,7 +166,7 @@ def _figure(attempts: Attempts, name: str, draw: Callable[[T], str], shown: T) -
 
 
 def _verdicts(one: HeldOut) -> Iterator[tuple[str, str, str]]:
-    for (word, reasons), models in alike(one).items():
+    for (word, reasons), models in one.alike.items():
         yield f"{' and '.join(models)} model{'s' if len(models) > 1 else ''}", word, reasons
 
 

@@ -45,7 +45,12 @@ def print_fit(console: Console, fit: Fit, title: str, whole: tuple[str, ...], *,
     table = EstimatesTable(fit, whole)
     of = f"{whole[0]} model, " if len(whole) == 1 else ""
     grid = _grid(table, console.width, complete=verbose or fit.truth is not None)
-    print_titled(console, f"{title}: {of}{fit.request.estimator}, chain {fit.request.chain}", grid, 2 + (fit.truth is not None))
+    print_titled(
+        console,
+        f"{title}: {of}{fit.request.method.estimator_name}, chain {fit.request.method.chain_name}",
+        grid,
+        2 + (fit.truth is not None),
+    )
     if table.legend:
         console.print(Text(table.legend))
     complete = len(whole) > 1 and (verbose or fit.truth is not None)
@@ -101,7 +106,7 @@ def _told(fit: Fit) -> Iterator[str]:
     for model, why in fit.failures.items():
         yield f"{model}: no estimate: {why}"
     channel = fit.logs.fitted[0].torque
-    ignored = f", which chain {fit.request.chain} ignores: it takes it as logged"
+    ignored = f", which chain {fit.request.method.chain_name} ignores: it takes it as logged"
     logged = isinstance(fit.processing.alignment, AsLogged)
     asked = fit.robot_model.asked
     if asked.hold or asked.tie:

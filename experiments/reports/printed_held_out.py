@@ -9,7 +9,6 @@ from rich.text import Text
 
 from idbench.experiments.judgement.held_out import WORDS, HeldOut
 from idbench.experiments.judgement.judgement import Unjudged
-from idbench.experiments.reports.estimates import alike
 from idbench.experiments.text import error_percentage, new_table, percentage, print_titled
 from idbench.identify import Array
 from idbench.identify.judge.torque_interval import LEVEL, MOST
@@ -69,7 +68,7 @@ def _details_of(one: HeldOut, standing: Array) -> Iterator[str]:
     each = zip(joints, standing, units, strict=True)
     if apart := [f"{joint} {rms:.2g} {unit}" for joint, rms, unit in each if isfinite(rms)]:
         yield f"at rest and reversing, where friction is not determined: {', '.join(apart)}"
-    for (word, reasons), (model, *others) in alike(one).items():
+    for (word, reasons), (model, *others) in one.alike.items():
         same = f" ({', '.join(others)}: the same)" if others else ""
         yield f"{model}: {word}: {reasons}{same}"
     for model, why in one.fit.failures.items():

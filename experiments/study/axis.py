@@ -12,8 +12,8 @@ import numpy as np
 
 from idbench.experiments.errors import ExperimentError, StudyError
 from idbench.experiments.identification.chain_settings import replaced
-from idbench.experiments.requests.shared import CHAIN, ESTIMATOR
-from idbench.identify import CHAINS, ESTIMATORS, AbstractEstimator, Chain
+from idbench.experiments.identification.method import Method
+from idbench.identify import CHAINS, ESTIMATORS
 from idbench.sim.settings import Number, Whole, settings
 
 MOST_VALUES = 10000  # Values of an axis above which it is taken for a slip
@@ -170,27 +170,21 @@ def _plain(value: Any) -> Any:
 
 
 @dataclass(frozen=True)
-class Method:
-    """One combination of chain, estimator and their settings; all models of a study are identified with it."""
+class Combination:
+    """Chain, estimator and laws of friction, with settings along the axes; all models of a study are identified with it."""
 
-    chain_name: str
-    estimator_name: str
-    chain: Chain
-    estimator: AbstractEstimator
+    method: Method
     friction: str
     settings: tuple[Setting, ...]
 
-    @property
-    def names(self) -> tuple[str, str]:
-        """Of chain and estimator."""
-        return self.chain_name, self.estimator_name
-
-    def fits(self, settings: Mapping[str, Any]) -> bool:
-        """True if this method has the values of the axes, where they are given."""
+    def fits(self, chain: str, estimator: str, settings: Mapping[str, Any]) -> bool:
+        """True if it has this chain and estimator, and the values of the axes where they are given."""
+        if (chain, estimator) != (self.method.chain_name, self.method.estimator_name):
+            return False
         return all(settings.get(s.axis.field, s.label) == s.label for s in self.settings)
 
 
-def methods_of(chains: Sequence[str], estimators: Sequence[str], friction: str, axes: Sequence[Axis]) -> Iterator[Method]:
+def methods_of(chains: Sequence[str], estimators: Sequence[str], friction: str, axes: Sequence[Axis]) -> Iterator[Combination]:
     """Yield every combination of chains, estimators and the values of axes; estimators that see no chain with the first."""
     for name, way, combination in product(chains, estimators, list(combinations(axes))):
         chain, estimator = CHAINS.create(name), ESTIMATORS.create(way)
@@ -199,20 +193,20 @@ def methods_of(chains: Sequence[str], estimators: Sequence[str], friction: str, 
         for setting in whole_first(combination):
             chain, estimator = setting.applied(chain, "chain"), setting.applied(estimator, "estimator")
         laws = next((str(setting.value) for setting in combination if setting.axis.field == FRICTION), friction)
-        yield Method(name, way, chain, estimator, laws, combination)
+        yield Combination(Method(name, way, chain, estimator), laws, combination)
 
 
-def servo_methods(friction: str, axes: Sequence[Axis]) -> Iterator[Method]:
+def servo_methods(friction: str, axes: Sequence[Axis]) -> Iterator[Combination]:
     """Yield what the closed loop of servos is fitted with: every law of friction."""
-    chain, estimator = CHAINS.create(CHAIN), ESTIMATORS.create(ESTIMATOR)  # which see no servo
+    method = replace(Method.named(), chain_name="commands", estimator_name="closed loop")  # chain and estimator see no servo
     for combination in combinations(axes):
         laws = next((str(setting.value) for setting in combination if setting.axis.field == FRICTION), friction)
-        yield Method("commands", "closed loop", chain, estimator, laws, combination)
+        yield Combination(method, laws, combination)
 
 
-def of_currents(method: Method) -> Method:
-    """Method for the torque of servos' currents, in the place of that for their closed loop."""
-    return replace(method, chain_name=CHAIN, estimator_name=ESTIMATOR, friction="standard", settings=())
+def of_currents() -> Combination:
+    """Combination for the torque of servos' currents, in the place of that for their closed loop."""
+    return Combination(Method.named(), "standard", ())
 
 
 def combinations(axes: Sequence[Axis]) -> Iterator[tuple[Setting, ...]]:

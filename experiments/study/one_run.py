@@ -5,12 +5,13 @@ from dataclasses import replace
 from pathlib import Path
 
 from idbench.experiments.errors import ExperimentError
+from idbench.experiments.identification.method import Method
 from idbench.experiments.identification.request import Request
 from idbench.experiments.identification.robot_model import RobotModel, absolute
 from idbench.experiments.identification.scenario_run import ScenarioRun
 from idbench.experiments.requests.jobs import RunRequest
 from idbench.experiments.requests.shared import Parameters
-from idbench.experiments.study.axis import Method, of_currents
+from idbench.experiments.study.axis import Combination, of_currents
 from idbench.sim.drives import IdealDrive
 from idbench.sim.errors import RobotError
 from idbench.sim.robot.robot import Robot
@@ -31,29 +32,18 @@ def run_of(asked: RunRequest, tell: Callable[[str], None]) -> ScenarioRun:
     if asked.scenario is None:
         if asked.robot is not None:
             raise ExperimentError(f"--robot {asked.robot}: a run of a study is of the study's robot")
-        scenario, method = _again(tell, asked.study, asked.index, asked.method)
-        names, name = method.names, f"{'-'.join(method.names)}-study"
-        chosen, parameters = (method.chain, method.estimator), Parameters(friction=tuple(method.friction.split()))
+        scenario, combination = _again(tell, asked.study, asked.index, asked.method)
+        method, parameters = combination.method, Parameters(friction=tuple(combination.friction.split()))
+        name = f"{method.chain_name}-{method.estimator_name}-study"
         if asked.parameters != Parameters():
             raise ExperimentError("--from: which parameters are identified is the study's; leave --friction and the like out")
     else:
         if asked.study is not None or asked.index is not None:
             raise ExperimentError(f"{asked.scenario} and --from or --index: name a scenario, or a run of a study")
         scenario = _with_robot(tell, load(asked.scenario), asked.robot)
-        names = (asked.chain, asked.estimator)
-        name = ""
-        chosen = None
-        parameters = asked.parameters
+        method, parameters, name = Method.named(asked.chain, asked.estimator), asked.parameters, ""
     robot_model = RobotModel(scenario.robot, parameters)
-    request = Request(
-        robot_model,
-        chain=names[0],
-        estimator=names[1],
-        method=chosen,
-        name=name,
-        start=asked.start,
-    )
-    return ScenarioRun(scenario, request)
+    return ScenarioRun(scenario, Request(robot_model, method=method, name=name, start=asked.start))
 
 
 def _with_robot(tell: Callable[[str], None], scenario: Scenario, robot: str | None) -> Scenario:
@@ -77,8 +67,10 @@ def _has_motors(robot: str) -> bool:
         return False
 
 
-def _again(tell: Callable[[str], None], folder: Path | None, index: int | None, method: int | None) -> tuple[Scenario, Method]:
-    """Return the scenario of a run of a study, which is reproduced, and the method by which it is identified."""
+def _again(
+    tell: Callable[[str], None], folder: Path | None, index: int | None, method: int | None
+) -> tuple[Scenario, Combination]:
+    """Return the scenario of a run of a study, which is reproduced, and how it is identified."""
     from idbench.experiments.study.run_study import compare_again
     from idbench.experiments.study.store import Store
 
@@ -88,14 +80,14 @@ def _again(tell: Callable[[str], None], folder: Path | None, index: int | None, 
     number, methods = method or 0, store.study.methods
     if not 0 <= number < len(methods):
         raise ExperimentError(f"--method {number} does not exist: the study has methods 0 to {len(methods) - 1}")
-    chosen = of_currents(methods[number]) if store.study.of_servos else methods[number]
+    chosen = of_currents() if store.study.of_servos else methods[number]
     rows, known = compare_again(store, index)
     tell(
         f"run {index} of {folder}: all {len(rows)} rows are the same again, bit for bit"
         if known
         else f"run {index} of {folder}, which the study has not finished yet"
     )
-    words = [*chosen.names, *(f"{s.axis.field} {s.label}" for s in chosen.settings)]
+    words = [chosen.method.chain_name, chosen.method.estimator_name, *(f"{s.axis.field} {s.label}" for s in chosen.settings)]
     tell(f"shown: method {number} of the study's {len(methods)}: {', '.join(words)}")
     for reason in dict.fromkeys(row["failure"] for row in rows if row["failure"]):
         tell(f"warning: {reason}")

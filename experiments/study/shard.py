@@ -10,7 +10,7 @@ import numpy as np
 
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.identification.simulators import RobotPlant, ScenarioLoop
-from idbench.experiments.study.axis import Method
+from idbench.experiments.study.axis import Combination
 from idbench.experiments.study.servo_rows import SERVO, rows_of
 from idbench.experiments.study.statistics import BOUNDS
 from idbench.experiments.study.study import Study
@@ -101,16 +101,18 @@ def run_shard(study: Study, runs: range, *, progress: Progress | None = None) ->
             continue
         shard.seconds["simulation"] += time.perf_counter() - start
         done += len(together) * steps
-        for k, method in enumerate(study.methods):
+        for k, combination in enumerate(study.methods):
             start = time.perf_counter()
             if study.of_servos:
-                common = [_common(study, method, run, SERVO, seed) for run, seed in zip(together, simulated.seeds, strict=True)]
-                shard.rows += rows_of(study.parameters, parts_of(study), method.friction, simulated, common)
+                common = [
+                    _common(study, combination, run, SERVO, seed) for run, seed in zip(together, simulated.seeds, strict=True)
+                ]
+                shard.rows += rows_of(study.parameters, parts_of(study), combination.friction, simulated, common)
             else:
-                truth, bounds = known[method.friction]
-                simulation = _simulation(study, method, simulated, together, truth)
-                shard.rows += _identify(study, method, simulated, list(together), truth, bounds, simulation)
-            shard.seconds[f"{method.chain_name} {method.estimator_name}"] += time.perf_counter() - start
+                truth, bounds = known[combination.friction]
+                simulation = _simulation(study, combination, simulated, together, truth)
+                shard.rows += _identify(study, combination, simulated, list(together), truth, bounds, simulation)
+            shard.seconds[f"{combination.method.chain_name} {combination.method.estimator_name}"] += time.perf_counter() - start
             tell(2.0 + k)
     shard.rows.sort(key=lambda row: row["run"])
     return shard
@@ -162,7 +164,7 @@ def _part(progress: Progress | None, done: int, part: int, whole: int) -> Progre
 
 def _identify(
     study: Study,
-    method: Method,
+    combination: Combination,
     simulated: Run,
     runs: Sequence[int],
     truth: Mapping[str, float],
@@ -170,16 +172,16 @@ def _identify(
     simulation: Simulation,
 ) -> Iterator[dict[str, Any]]:
     """Yield a row for every run and model."""
-    for places in _alike(study, method, simulated, len(runs)):
+    for places in _alike(study, combination, simulated, len(runs)):
         own = {name: x[places] for name, x in bounds.items()}
         begin = simulation.start if simulation.start is None or simulation.start.ndim < 2 else simulation.start[places]
         logs = [simulated.log.run(([k * len(runs) + i for i in places],)) for k in range(study.most_logs)]
-        found = _outcomes(study, method, simulated, logs, replace(simulation, start=begin))
+        found = _outcomes(study, combination, simulated, logs, replace(simulation, start=begin))
         for model in study.models:
             outcome = found[model]
             columns = _columns(outcome, truth, own) if isinstance(outcome, Estimate) else {}
             for place, i in enumerate(places):
-                common = _common(study, method, runs[i], model, simulated.seeds[i])
+                common = _common(study, combination, runs[i], model, simulated.seeds[i])
                 ends = (simulated.failures.get(i + k * len(runs)) for k in range(study.logs_of(model)))
                 if reason := next(filter(None, ends), None) or _failure(outcome, place):
                     yield common | {"failure": reason}
@@ -188,50 +190,54 @@ def _identify(
 
 
 def _outcomes(
-    study: Study, method: Method, simulated: Run, logs: Sequence[MotionLog], simulation: Simulation
+    study: Study, combination: Combination, simulated: Run, logs: Sequence[MotionLog], simulation: Simulation
 ) -> dict[str, Estimate | IdentificationError]:
     """What each model gives of some runs."""
-    found, chain = dict[str, Estimate | IdentificationError](), _trimmed(study, method, simulated)
+    found, chain = dict[str, Estimate | IdentificationError](), _trimmed(study, combination, simulated)
     for count in dict.fromkeys(map(study.logs_of, study.models)):
         models = {name: model for name, model in study.created_models.items() if study.logs_of(name) == count}
-        basis = study.subjects[method.friction].basis
+        basis = study.subjects[combination.friction].basis
         try:
             problem = settled(Problem(tuple(logs[:count]), basis, ExplicitModel(), chain, simulation))
-            found |= attempt_each(problem, models, method.estimator, throw=False)
+            found |= attempt_each(problem, models, combination.method.estimator, throw=False)
         except IdentificationError as error:
             found |= dict.fromkeys(models, error)
     return found
 
 
-def _alike(study: Study, method: Method, simulated: Run, runs: int) -> list[list[int]]:
+def _alike(study: Study, combination: Combination, simulated: Run, runs: int) -> list[list[int]]:
     """Places of runs whose logs get the same prefilters: each is identified as if it were alone.
 
     Estimators that simulate robots take all runs at once, and the prefilter that the noisiest of them needs.
     """
     groups: dict[tuple[AbstractPrefilter, ...], list[int]] = defaultdict(list)
-    if {"loop", "plant"} & method.estimator.needs or not isinstance(method.chain.prefilter, NoisePrefilter):
+    if {"loop", "plant"} & combination.method.estimator.needs or not isinstance(
+        combination.method.chain.prefilter, NoisePrefilter
+    ):
         return [list(range(runs))]
     for i in range(runs):
         logs = (simulated.log.run((k * runs + i,)) for k in range(study.most_logs))
-        groups[tuple(map(method.chain.suited_prefilter, logs))].append(i)
+        groups[tuple(map(combination.method.chain.suited_prefilter, logs))].append(i)
     return list(groups.values())
 
 
-def _trimmed(study: Study, method: Method, simulated: Run) -> Chain:
+def _trimmed(study: Study, combination: Combination, simulated: Run) -> Chain:
     """Return the chain of a method; if models are to have equal numbers of rows, with the longest margin of all of them."""
-    if study.rows == "own" or method.chain.trim is not None:
-        return method.chain
+    if study.rows == "own" or combination.method.chain.trim is not None:
+        return combination.method.chain
     models = study.created_models.values()
-    return replace(method.chain, trim=max(method.chain.of_model(m).margin(simulated.log) for m in models))
+    return replace(
+        combination.method.chain, trim=max(combination.method.chain.of_model(m).margin(simulated.log) for m in models)
+    )
 
 
 def _simulation(
-    study: Study, method: Method, simulated: Run, together: Mapping[int, Reference | None], truth: Mapping[str, float]
+    study: Study, combination: Combination, simulated: Run, together: Mapping[int, Reference | None], truth: Mapping[str, float]
 ) -> Simulation:
     """Simulation of the runs' robots, by estimators that need it, and where these begin."""
     motions = tuple(motion for motion in together.values() if motion is not None)
-    needs = method.estimator.needs
-    robot_model = study.subjects[method.friction]
+    needs = combination.method.estimator.needs
+    robot_model = study.subjects[combination.friction]
     start = None
     loop = ScenarioLoop(robot_model, (simulated.scenario,), (simulated.log,), motions) if "loop" in needs else None
     if study.start:
@@ -271,13 +277,13 @@ def _columns(estimate: Estimate, truth: Mapping[str, float], bounds: Mapping[str
 def _fail(shard: Shard, study: Study, scenarios: Mapping[int, Scenario], runs: Sequence[int], reason: str) -> None:
     """Write the reason why runs could not be simulated into all their rows."""
     for run in runs:
-        for method in study.methods:
+        for combination in study.methods:
             for model in study.models:
-                shard.rows.append(_common(study, method, run, model, scenarios[run].seed) | {"failure": reason})
+                shard.rows.append(_common(study, combination, run, model, scenarios[run].seed) | {"failure": reason})
 
 
-def _common(study: Study, method: Method, run: int, model: str, seed: int) -> dict[str, Any]:
+def _common(study: Study, combination: Combination, run: int, model: str, seed: int) -> dict[str, Any]:
     """Columns of every row."""
-    settings = {s.axis.field: s.label for s in (*study.points[run // study.seeds].settings, *method.settings)}
-    names = {"chain": method.chain_name, "estimator": method.estimator_name, "model": model}
+    settings = {s.axis.field: s.label for s in (*study.points[run // study.seeds].settings, *combination.settings)}
+    names = {"chain": combination.method.chain_name, "estimator": combination.method.estimator_name, "model": model}
     return {"run": run, "seed": seed, **settings, **names, "failure": None}

@@ -14,7 +14,16 @@ from pydantic import Field
 from idbench.experiments.errors import StudyError
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.requests.shared import CHAIN, ESTIMATOR, Parameters
-from idbench.experiments.study.axis import FRICTION, Axis, Method, Setting, combinations, methods_of, servo_methods, whole_first
+from idbench.experiments.study.axis import (
+    FRICTION,
+    Axis,
+    Combination,
+    Setting,
+    combinations,
+    methods_of,
+    servo_methods,
+    whole_first,
+)
 from idbench.experiments.study.servo_rows import SERVO, names_of
 from idbench.identify import MODELS, AbstractModel
 from idbench.identify.models import THREE, rows_per_sample
@@ -122,7 +131,7 @@ class Study:
         given = [key for key, there in keys.items() if there]
         if not given:
             return
-        loops = [method.estimator_name for method in self.methods if "loop" in method.estimator.needs]
+        loops = [one.method.estimator_name for one in self.methods if "loop" in one.method.estimator.needs]
         refused = {
             "a study of servos": self.of_servos,
             "bound = true": self.bound,
@@ -184,7 +193,7 @@ class Study:
             yield Point(from_dict(content), combination)
 
     @cached_property
-    def methods(self) -> tuple[Method, ...]:
+    def methods(self) -> tuple[Combination, ...]:
         """The grid of identifications."""
         axes = [axis for axis in self.every_axis if axis.identification]
         if self.of_servos:

@@ -37,6 +37,6 @@ def _by_size(entry: tuple[Cell, str, float, int]) -> float:
 
 def command(study: Study, folder: Path, cell: Cell, run: int) -> str:
     """Command that makes a run again, identified as in a cell."""
-    number = next(i for i, found in enumerate(study.methods) if found.names == cell.names[:2] and found.fits(cell.settings))
+    number = next(i for i, found in enumerate(study.methods) if found.fits(*cell.names[:2], cell.settings))
     chosen = f" --method {number}" if number else ""
     return f"{program()} run --from {quote(str(folder))} --index {run}{chosen}"

@@ -155,7 +155,7 @@ def identified_row(folder: Path, definition: Definition, out: Path) -> Row:
         "title": definition.title,
         "joints": list(own.robot_model.robot.joints),
         "model": own.leading,
-        "estimator": own.request.estimator,
+        "estimator": own.request.method.estimator_name,
         "parameters": len(own.basis.names),
         "estimate": _estimate(own),
         "seconds": made.seconds,

@@ -8,6 +8,7 @@ import pytest
 from idbench.experiments.identification.fitting import fit
 from idbench.experiments.identification.friction_choice import chosen_friction
 from idbench.experiments.identification.logs import Logs
+from idbench.experiments.identification.method import Method
 from idbench.experiments.identification.request import Request
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.identify import ExplicitModel, MotionLog, Problem, TorqueChannel, validate
@@ -79,9 +80,9 @@ def studied(name, seed, laws, masked):
     fitted, unseen = (
         log(robot_model, joints, np.random.default_rng([seed, k]), *own) for k, own in ((1, (40, 1.5)), (2, (20, 2.0)))
     )
-    request = Request(robot_model, models=("explicit",), estimator="WLS")
+    request = Request(robot_model, models=("explicit",), method=Method.named(estimator="WLS"))
     if not masked:
-        request = replace(request, method=(replace(request.processing, mask=NoMask()), request.solver))
+        request = replace(request, method=(replace(request.processing, mask=NoMask()), request.method.method.estimator))
     auto, _ = chosen_friction(request, (fitted,))
     rms = []
     for each in (request, auto):

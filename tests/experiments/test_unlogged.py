@@ -173,7 +173,7 @@ def test_poses_at_rest_give_gravity_and_their_standard_errors_hold(rest):
     for seed in range(6):
         path = rest(f"{seed}.csv", 60, 10 * seed, 0.05)
         fit = identified(IdentifyRequest(log=(path,), robot="puma560", torque="instantaneous"))
-        assert fit.request.chain == "poses"
+        assert fit.request.method.chain_name == "poses"
         estimate, truth = fit.estimates["explicit"], fit.robot_model.truth(fit.robot_model.robot)
         assert all(name.startswith("M") for name in estimate.names)
         z += [(x - truth[name]) / s for name, x, s in zip(estimate.names, estimate.X, estimate.standard_errors, strict=True)]

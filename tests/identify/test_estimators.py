@@ -8,6 +8,7 @@ import pytest
 
 from idbench.experiments.identification.fitting import fit
 from idbench.experiments.identification.logs import Logs
+from idbench.experiments.identification.method import Method
 from idbench.experiments.identification.request import Request
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.identification.simulators import RobotPlant, ScenarioLoop
@@ -154,7 +155,7 @@ def test_several_logs_with_a_loop_each_are_one_fit_and_looked_at_one_by_one(sixt
     both = (log, scenario), (simulate(second).alone(), second)
     whole, *alone = (
         fit(
-            Request(estimator="IV", models=("explicit",), loops=tuple(loop for _, loop in some)),
+            Request(method=Method.named(estimator="IV"), models=("explicit",), loops=tuple(loop for _, loop in some)),
             Logs(tuple(log for log, _ in some)),
         )
         for some in (both, both[:1], both[1:])

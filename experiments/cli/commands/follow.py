@@ -137,7 +137,7 @@ class Follower:
             self._base = Base(name, robot_model.robot, log.fs, ("measured",), qd, self.audience)
         stream = self._base.stream if self._base else Stream(name)
         joints = parts(robot_model.robot.joints)
-        self._live = LiveIdentification(stream, robot_model, self.request.chain, log.torque, log.fs, joints)
+        self._live = LiveIdentification(stream, robot_model, self.request.method.chain_name, log.torque, log.fs, joints)
         return self._live
 
 

@@ -15,7 +15,6 @@ from idbench.experiments.cli.options.jobs import Identify
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.fit import Fit
 from idbench.experiments.identification.job import (
-    assumes_the_robot,
     fit_of,
     loaded_logs,
     notes_of,
@@ -25,13 +24,13 @@ from idbench.experiments.identification.job import (
 from idbench.experiments.identification.logs import delay_method
 from idbench.experiments.identification.reading import DELAY_FOUND, file_of
 from idbench.experiments.identification.request import Request
-from idbench.experiments.identification.robot_model import SCARA
 from idbench.experiments.inputs import files_of
+from idbench.experiments.judgement.conclusion import conclusion
 from idbench.experiments.judgement.judgement import Judgement, judge
 from idbench.experiments.judgement.remedies import checks
 from idbench.experiments.note import noted
 from idbench.experiments.recording.audience import Audience
-from idbench.experiments.reports.estimates import conclusion, models_in_full, verdict_on
+from idbench.experiments.reports.estimates import models_in_full
 from idbench.experiments.reports.printed import print_fit
 from idbench.experiments.reports.printed_held_out import print_held_out
 from idbench.experiments.results.attempts import Attempts
@@ -39,8 +38,6 @@ from idbench.experiments.results.folder import ResultsFolder
 from idbench.experiments.results.page import COLORS, Page, stages_of
 from idbench.experiments.results.writing import write_summary
 from idbench.identify.files.log_file import write_log
-
-ASSUMED = f"no --robot was given, the shipped {SCARA} is assumed"
 
 
 def identify(options: Identify) -> None:
@@ -69,14 +66,13 @@ def identify(options: Identify) -> None:
             except BaseException:  # whatever ends it, the estimates are worth keeping
                 _show_fit(page, result, options, whole_models)
                 raise
-            answer = "", ""
-            if judgement is not None:
-                answer = _answered(judgement, warnings, options)
-                page.print(Text(answer[0], f"bold {COLORS.get(_word(judgement), '')}".strip()), soft_wrap=True)
-                page.print(Text(f"{answer[1]}\n", "bold"), soft_wrap=True)
-            _show_fit(page, result, options, whole_models)
             if judgement is None:
+                _show_fit(page, result, options, whole_models)
                 return
+            answer = conclusion(judgement, warnings)
+            page.print(Text(answer.finding, f"bold {COLORS.get(answer.word, '')}".strip()), soft_wrap=True)
+            page.print(Text(f"next: {answer.step}\n", "bold"), soft_wrap=True)
+            _show_fit(page, result, options, whole_models)
             for one in judgement.on:
                 print_held_out(page, one, whole_models, verbose=options.verbose)
             page.found |= judgement.summary()
@@ -93,21 +89,6 @@ def _checked(judgement: Judgement, options: Identify, attempts: Attempts) -> Map
     with stages_of("checking"):
         delay = delay_method(options.torque_delay) is None
         return attempts.attempt("the checks", lambda: checks(judgement, delay=delay, trials=not options.no_trials)) or {}
-
-
-def _word(judgement: Judgement) -> str:
-    verdict = verdict_on(judgement)
-    return verdict.word if verdict else ""
-
-
-def _answered(judgement: Judgement, warnings: Mapping[str, Sequence[str]], options: Identify) -> tuple[str, str]:
-    """The verdict in a sentence, and what to do next: terminal and report show the same."""
-    said, step = conclusion(judgement, warnings)
-    if _word(judgement) == "poor" and assumes_the_robot(options):
-        step = f"next: {ASSUMED}: --robot FILE names another"
-    elif judgement.good and options.write:
-        step = "next: docs/exports.md says how the written files are used"
-    return said, step
 
 
 def _judged(result: Fit, options: Identify) -> Judgement:
@@ -132,8 +113,7 @@ def _followed(stack: ExitStack, options: Identify, request: Request, audience: A
 def _show_fit(page: Page, result: Fit, options: Identify, whole: tuple[str, ...]) -> None:
     """Show the estimates."""
     print_fit(page, result, ", ".join(map(str, options.log)), whole, verbose=options.verbose)
-    notes = (note for note in notes_of(result) if noted(note).about != DELAY_FOUND)
-    for note in (*notes, *([ASSUMED] if assumes_the_robot(options) else [])):
+    for note in (note for note in notes_of(result) if noted(note).about != DELAY_FOUND):
         page.print(Text(note), soft_wrap=True)
     page.show()
 

@@ -11,6 +11,7 @@ from idbench.experiments.errors import ExperimentError, ResultsError
 from idbench.experiments.exports.exports import EXPORTS
 from idbench.experiments.identification.fit import Fit
 from idbench.experiments.identification.robot_model import RobotModel
+from idbench.experiments.judgement.conclusion import Conclusion
 from idbench.experiments.judgement.judgement import Judgement
 from idbench.experiments.recording.audience import Audience
 from idbench.experiments.results.attempts import Attempts
@@ -31,7 +32,7 @@ class Shown:
     """The same as it is typed."""
     judgement: Judgement
     """The judged fit."""
-    answer: tuple[str, str]
+    answer: Conclusion
     """The verdict in a sentence, and the next step."""
     warnings: Mapping[str, Sequence[str]]
     """What to check, by what it is about."""

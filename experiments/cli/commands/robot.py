@@ -31,7 +31,7 @@ def describe(options: DescribeRobot) -> None:
     asked, page = with_own_parts(options), Page(machine=options.json)
     robot_model = RobotModel(absolute(asked.name), asked.parameters, asked.mounting.mounting)
     robot_model.require_laws()
-    _ = robot_model.prior()
+    robot_model.check()
     if robot_model.robot.n > MANY:
         sys.stderr.write(f"idbench: grouping the parameters of {robot_model.robot.n} joints takes a while\n")
     truth = robot_model.truth(robot_model.robot)

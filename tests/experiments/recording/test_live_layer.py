@@ -6,6 +6,7 @@ import rerun as rr
 
 from idbench.experiments.identification.fitting import fit
 from idbench.experiments.identification.logs import Logs
+from idbench.experiments.identification.method import Method
 from idbench.experiments.identification.request import Request
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.recording.live_layer import LiveIdentification
@@ -30,7 +31,7 @@ def test_the_last_estimate_is_that_of_the_log_so_far(grown, table1):
     samples = live.fit.logs.fitted[0].samples
     log = table1.log
     part = MotionLog(log.fs, log.q[:samples], log.tau[:samples], log.torque)
-    expected = fit(Request(estimator="WLS"), Logs((part,))).estimates
+    expected = fit(Request(method=Method.named(estimator="WLS")), Logs((part,))).estimates
     for form, estimate in live.fit.estimates.items():
         np.testing.assert_array_equal(estimate.X, expected[form].X)
 

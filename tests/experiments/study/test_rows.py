@@ -94,8 +94,8 @@ def test_cases_are_settings_that_go_together(content):
 def test_a_stage_with_its_settings_is_a_value(content):
     stages = [{"kind": "windows", "length": 0.3}, "fir", {"kind": "iir", "order": 1}]
     study = study_from({**content, "axes": [{"field": "chain.operator", "values": stages}]}, "study")
-    assert study.methods[0].chain.operator == Windows(0.3)
-    assert study.methods[2].chain.operator.order == 1
+    assert study.methods[0].method.chain.operator == Windows(0.3)
+    assert study.methods[2].method.chain.operator.order == 1
     assert [method.settings[0].label for method in study.methods] == ["windows, length 0.3", "fir", "iir, order 1"]
 
 

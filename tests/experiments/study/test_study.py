@@ -30,7 +30,7 @@ def test_the_grid_is_every_combination(content):
 
 def test_identification_is_varied_on_the_same_simulations(small):
     assert small.size == 18
-    assert [method.chain.operator.cutoff for method in small.methods] == [4.0, 5.0]
+    assert [method.method.chain.operator.cutoff for method in small.methods] == [4.0, 5.0]
 
 
 def test_stages_are_chosen_by_name_and_fields_go_together(content):
@@ -42,10 +42,10 @@ def test_stages_are_chosen_by_name_and_fields_go_together(content):
     ]
     methods = study_from({**axes(content, *more), "estimators": ["WLS"]}, "study").methods
     assert len(methods) == 8
-    assert all(isinstance(method.chain.operator, IirLowPass) for method in methods)
-    assert {type(method.chain.mask) for method in methods} > {NoMask}
-    assert {method.estimator.rounds for method in methods} == {1, 3}
-    assert all(method.chain.trim == method.chain.operator.cutoff for method in methods)
+    assert all(isinstance(method.method.chain.operator, IirLowPass) for method in methods)
+    assert {type(method.method.chain.mask) for method in methods} > {NoMask}
+    assert {method.method.estimator.rounds for method in methods} == {1, 3}
+    assert all(method.method.chain.trim == method.method.chain.operator.cutoff for method in methods)
 
 
 def test_a_part_of_another_kind_replaces_the_base_scenarios(content):

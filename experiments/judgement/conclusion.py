@@ -1,0 +1,81 @@
+"""What a judged identification comes to: one sentence, and the next step."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from idbench.experiments.identification.causes import Cause
+from idbench.experiments.identification.robot_model import ASSUMED
+from idbench.experiments.judgement.held_out import FAIR, GOOD
+from idbench.experiments.judgement.judgement import Judgement
+from idbench.experiments.judgement.warnings import DELAY, LOG
+from idbench.experiments.note import noted
+from idbench.experiments.text import error_percentage
+
+
+@dataclass(frozen=True)
+class Conclusion:
+    """The answer that terminal, report, recording and Python show."""
+
+    word: str
+    """The verdict on the leading model on the hardest held-out log; empty if there is no such log."""
+    finding: str
+    """The verdict in one sentence."""
+    step: str
+    """What to do next."""
+
+    def __str__(self) -> str:
+        return f"{self.finding}; next: {self.step}"
+
+
+def conclusion(judgement: Judgement, warnings: Mapping[str, Sequence[str]]) -> Conclusion:
+    """The answer on the hardest held-out log.
+
+    What is wrong with the log, and has an option that mends it, comes before mistakes of the model: it may cause them.
+    """
+    verdict = judgement.verdict
+    word = verdict.word if verdict else ""
+    of_log = next((warning for warning in warnings.get(LOG, ()) if noted(warning).option), "")
+    first = next((found[0] for found in warnings.values() if found), "")
+    late = next((option for warning in warnings.get(DELAY, ()) if (option := noted(warning).option)), "")
+    causes = judgement.fit.diagnosis or ()
+    if late and causes and causes[0].suspect.cause == "delay":
+        return Conclusion(word, _finding(judgement, causes), late)
+    step = _next(judgement, of_log, first)
+    if word == "poor" and judgement.fit.robot_model.assumed:
+        step = f"{ASSUMED}: --robot FILE names another"
+    return Conclusion(word, _finding(judgement, [] if of_log else causes), step)
+
+
+def _finding(judgement: Judgement, causes: Sequence[Cause]) -> str:
+    one, verdict = judgement.hardest, judgement.verdict
+    if one is None or verdict is None:
+        return "Result: not validated"
+    model = one.fit.leading
+    if verdict.wrong:
+        return f"Result: {verdict.word} ({model} model): {verdict.wrong[0].finding}"
+    worst = float(np.nanmax(np.nan_to_num(one.torques[model].percent, nan=0.0, posinf=np.inf)))
+    beyond = float(np.nanmax(np.nan_to_num(one.torques[model].percent_of_level(one.torques[model].excess), posinf=np.inf)))
+    most = {"good": GOOD, "fair": FAIR}.get(verdict.word, np.inf)
+    noisy = f", {error_percentage(beyond)} beyond noise and sigma," if beyond < most < worst else ""
+    off = f"torque errors of at most {error_percentage(worst)}{noisy}"
+    found = f"Result: {verdict.word} ({model} model), {off} on {one.title.finding}"
+    return "; ".join([found, *(cause.words for cause in causes[:1])])
+
+
+def _next(judgement: Judgement, of_log: str, first: str) -> str:
+    """Next step: about the log, then the proved remedy of the first mistake, else the first doubt."""
+    if of_log:
+        return of_log
+    for cause in judgement.fit.diagnosis or ():
+        return cause.mends
+    if first:
+        return first
+    if judgement.good:
+        return "--write arm.urdf arm.json arm.py keeps the robot"
+    if judgement.fit.logs.fitted[0].poses:
+        return "more poses"
+    asked = judgement.fit.request.robot_model.asked.friction
+    law = "" if judgement.fit.choice is not None or asked != ("standard",) else ", or another law of friction (--friction auto)"
+    return f"a longer or more exciting motion (idbench excite){law}"
