@@ -61,7 +61,7 @@ def test_a_part_that_is_chosen_does_not_undo_what_is_set_in_it(content):
     )
     for order in ([cutoff, stage], [stage, cutoff]):
         methods = study_from(content | {"axes": order}, "study").methods
-        assert sorted((type(m.chain.operator).__name__, m.chain.operator.cutoff) for m in methods) == [
+        assert sorted((type(m.method.chain.operator).__name__, m.method.chain.operator.cutoff) for m in methods) == [
             ("FirLowPass", 2.0),
             ("FirLowPass", 4.5),
             ("IirLowPass", 2.0),
