@@ -30,6 +30,10 @@ class Wording(NamedTuple):
 WORDINGS: Mapping[tuple[str, str], Wording] = {
     ("gain", "torque"): Wording("torque constant {size} too {large}", "--gain {gains}"),
     ("sign", "torque"): Wording("the torque has the other sign", "--gain {gains}"),
+    ("sign", "joint"): Wording(
+        "position and torque have the other sign: its axis points the other way",
+        by="turn the axis in the robot's file, or both signs in the log",
+    ),
     ("sign", "position"): Wording(
         "the position has the other sign", by="turn the axis in the robot's file, or the sign in the log"
     ),
@@ -68,6 +72,9 @@ WORDINGS: Mapping[tuple[str, str], Wording] = {
     ("cogging", "drive"): Wording(
         "cogging of {setting:g} waves a turn, {size}", "--friction {laws}", law="cogging:{setting:g}"
     ),
+    ("commutation", "drive"): Wording(
+        "torque constant with a ripple of {setting:g} waves a turn, {size}", by="correct currents by a table over the position"
+    ),
     ("backlash", "drive"): Wording("play of {size}", by="measure positions at the link"),
     ("elasticity", "drive"): Wording("compliance of {size}", by="measure positions at the link, or move more slowly"),
     ("length", "link"): Wording("origin of the joint off by {size} along {axis}", by="correct its origin in the robot's file"),
@@ -87,6 +94,9 @@ WORDINGS: Mapping[tuple[str, str], Wording] = {
     ("exchanged", "position"): Wording(
         "its position is exchanged with that of {other}", by="exchange their columns: --columns q=..."
     ),
+    ("exchanged", "joint"): Wording(
+        "its columns are exchanged with those of {other}", by="give the joints in the order of the columns: --joints {joints}"
+    ),
     ("missing_torque", "torque"): Wording(
         "its torque never changes: it was not logged, and its rows are left out", by="log it"
     ),
@@ -102,7 +112,7 @@ def causes_of(
     return tuple(Cause(each, robot_model, log, gains, turned) for each in suspects)
 
 
-LENGTHS = frozenset({"tilt", "axis", "eccentric", "cogging", "base_motion"})
+LENGTHS = frozenset({"tilt", "axis", "eccentric", "cogging", "commutation", "base_motion"})
 """Causes of two sizes across each other, whose length is reported."""
 
 

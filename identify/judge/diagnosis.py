@@ -6,14 +6,14 @@ from dataclasses import replace
 import numpy as np
 import scipy
 
-from idbench.identify.arrays import HELD, TINY, Array
+from idbench.identify.arrays import TINY, Array
 from idbench.identify.basis.block import Kind
 from idbench.identify.data.motion_log import MotionLog, never_logged
 from idbench.identify.estimators.problem import Problem
 from idbench.identify.judge.small_mistakes import small_mistakes
 from idbench.identify.judge.suspect import Suspect
-from idbench.identify.judge.whole_mistakes import whole_mistake
-from idbench.identify.signals.signals import State
+from idbench.identify.judge.torque_gains import mean_inertias
+from idbench.identify.judge.whole_mistakes import whole_mistakes
 
 BALANCED, KNOWN = 0.1, 4.0
 """Share of its terms that a joint without a drive has as residual at most: what balances, balances to its noise; and sigma of
@@ -23,7 +23,6 @@ DRIVING: tuple[Kind, ...] = ("viscous friction", "Coulomb friction")
 """Kinds of friction that are both negative where a torque has the other sign; one may be by a wrong delay."""
 
 MOVES = 100.0  # Standard deviations of the noise of a position beyond which a joint moves, and does not flicker by a count
-STATES = 100  # Of a log, at which inertias are looked at
 SAMPLES = 20.0  # Samples for each period of the operator's cut-off with which large mistakes are looked for
 
 
@@ -39,37 +38,23 @@ def diagnosed(problem: Problem, X: Array) -> tuple[Suspect, ...]:
     """
     problem.require_rows("mistakes are looked for by rows, and ")
     small = small_mistakes(problem, X)
-    whole = whole_mistake(_thinned(problem.explicit), small[0] if small else None)
-    if whole and small and (whole.cause, whole.joint) == (small[0].cause, small[0].joint):
-        small, whole = (whole, *small[1:]), None
-    if whole and (whole.cause, whole.of) == ("sign", "torque"):
-        return tuple(_with_positive_inertia(problem.explicit, whole))
-    return (whole,) if whole else (*_impossible_signs(problem.explicit, X), *small)
-
-
-def _with_positive_inertia(problem: Problem, sign: Suspect) -> Iterator[Suspect]:
-    """Yield the torques whose other sign explains the rows with positive inertias: one, or all others.
-
-    With all torques negative, all parameters are, and residuals are the same.
-    """
-    n, absent = problem.basis.n, never_logged(problem.logs)
-    turned = np.where(np.arange(n) == sign.joint, -1.0, 1.0)
-    flipped = problem.with_logs([replace(log, tau=log.tau * turned) for log in problem.logs])
-    fit = flipped.factors.fit(2)
-    inertias = _mean_inertias(flipped, fit.X, fit.factor.inverse(np.array(fit.factor.determined)))
-    others = [j for j in range(n) if j != sign.joint and j not in absent]
-    negative = np.sum(np.sign(inertias)) < 0  # most of them
-    yield from (replace(sign, joint=j) for j in (others if others and negative else [sign.joint]))
+    whole = whole_mistakes(_thinned(problem.explicit), small[0] if small else None)
+    if whole and small and (whole[0].cause, whole[0].joint) == (small[0].cause, small[0].joint):
+        small, whole = (whole[0], *small[1:]), []
+    return tuple(whole) or (*_impossible_signs(problem.explicit, X), *small)
 
 
 def _impossible_signs(problem: Problem, X: Array) -> Iterator[Suspect]:
     """Yield joints whose friction would drive them, or whose inertia M_jj would be negative: their torque has the other sign.
 
     Where others feel little of a joint, all of its parameters change their sign with its torque, and residuals do not show it.
+    Poses at rest show neither.
     """
+    if any(log.poses for log in problem.logs):
+        return
     factor = problem.factors.fit(2).factor
     C = factor.inverse(np.array(factor.determined))
-    sigma, inertias = np.sqrt(np.diagonal(C)), _mean_inertias(problem, X, C)
+    sigma, inertias = np.sqrt(np.diagonal(C)), mean_inertias(problem, X, C)
     absent = never_logged(problem.logs)
     of_kind = {(p.kind, p.joint): k for k, p in enumerate(problem.basis.parameters)}
     for j in range(problem.basis.n):
@@ -80,30 +65,6 @@ def _impossible_signs(problem: Problem, X: Array) -> Iterator[Suspect]:
         if j not in absent and worst < -KNOWN and friction < KNOWN:
             p = float(scipy.special.ndtr(worst))
             yield Suspect("sign", "torque", j, (-1.0,), (0.0,), "1", p, -worst, (), (0.0, 0.0), 0.0)
-
-
-def _mean_inertias(problem: Problem, X: Array, C: Array) -> Array:
-    """Return the mean inertia of each joint along the first log, M_jj = c X with c of a unit velocity, over its sigma.
-
-    0 where a joint has none.
-    """
-    basis, state = problem.basis, problem.signals[0].state
-    some = slice(None, None, max(1, state.q.shape[-1] // STATES))
-    q, conditions = np.ascontiguousarray(state.q[..., some]), {name: x[..., some] for name, x in state.conditions.items()}
-    found = np.zeros(basis.n)
-    for j in range(basis.n):
-        unit = np.zeros_like(q)
-        unit[j] = 1.0
-        columns = basis.momentum(State(q, unit, lambda _: np.zeros_like(q), conditions))
-        c, held = np.zeros(len(X)), 0.0
-        for (row, place), column in columns.items():
-            if row == j and place == HELD:
-                held += float(np.mean(column))
-            elif row == j:
-                c[place] += float(np.mean(column))
-        variance = float(c @ C @ c)
-        found[j] = (c @ X + held) / np.sqrt(variance) if variance > 0 else 0.0
-    return found
 
 
 def _thinned(problem: Problem) -> Problem:

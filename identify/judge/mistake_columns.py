@@ -16,9 +16,6 @@ from idbench.identify.judge.fitted_motion import SMALL, FittedMotion
 CREEP = (0.1, 0.3)  # Velocities over a joint's rms speed above which friction near rest fades
 PRESLIDING = (0.01, 0.03, 0.1)  # Distances over the rms of a joint's positions in which friction turns
 
-TURNS = tuple(range(2, 13))
-"""Waves of a torque ripple a turn: of harmonic drives and motors with few poles, as far as rows of 5 Hz show them."""
-
 PARTING = 0.1  # Torque over the rms of a joint's within which teeth of its gear change sides
 LONG = 0.3  # Share of the largest distance between joints beyond which that of one is not a little off
 
@@ -85,9 +82,9 @@ def elasticity(m: FittedMotion, j: int) -> Rows:
     return whole_rows(-m.moved(j, m.load[j], first[j], second[j]))
 
 
-def cogging(m: FittedMotion, j: int, waves: int) -> tuple[Rows, ...]:
-    """Return columns of a ripple of so many waves a turn."""
-    return {j: np.sin(waves * m.state.q[j])}, {j: np.cos(waves * m.state.q[j])}
+def ripple(m: FittedMotion, j: int) -> tuple[Rows, ...]:
+    """Torques of a ripple of one wave a turn."""
+    return {j: np.sin(m.state.q[j])}, {j: np.cos(m.state.q[j])}
 
 
 def presliding(m: FittedMotion, j: int, share: float) -> Array:

@@ -8,24 +8,28 @@ import numpy as np
 
 from idbench.identify.arrays import Array
 from idbench.identify.basis.basis import Basis
+from idbench.identify.basis.newton_euler import torques
 from idbench.identify.estimators.log_rows import LogRows, split_by_log
 from idbench.identify.judge.fitted_motion import FittedMotion
 from idbench.identify.judge.mistake_columns import Rows
 from idbench.identify.judge.mistakes import (
     BASE,
+    COGGING,
     COLLISION,
+    COMMUTATION,
     FROM_AN_INSTANT,
     GAIN,
     OF_JOINTS,
     OF_ROBOT,
     Mistake,
 )
+from idbench.identify.judge.ripples import WAVES, likely_waves
 from idbench.identify.signals.signals import State
 
 RATE = 10.0  # Instants at which columns are made, in multiples of the operator's cut-off: they are smooth where rows count
 USUAL = 5.0  # Cut-off of an operator that states none [Hz]
 AT_ONCE = 2_000_000  # Values of columns that are filtered at once: some 16 MB
-OF_HINGES = frozenset({"eccentric", "cogging"})  # Mistakes of what turns
+OF_HINGES = frozenset({"eccentric"})  # Mistakes of what turns
 INSTANTS = 12  # Instants from which on something may have changed: a twelfth of a log apart
 PUSH = 0.3  # Time [s] that a collision takes, about: a robot that hits something stops, or gives way
 SLOWEST = 0.5  # Least frequency [Hz] at which a base is taken to move by itself
@@ -79,6 +83,10 @@ class MistakeRows:
         steady = [c for c in found if c.mistake not in FROM_AN_INSTANT]
         return [*steady, *(late for c in (*slips, *held) for late in self._from_instants(c))]
 
+    def of_robot(self, mistake: Mistake) -> Iterator[Candidate]:
+        """Yield a mistake of the whole robot; none where it has no columns."""
+        yield from self._made([(mistake, None)])
+
     def _gains(self) -> Iterator[Candidate]:
         """Yield torques that are too large beside others, from rows of what is predicted: parameters leave little of them."""
         held = np.concatenate([held_torque(part) for part in self.parts])
@@ -115,11 +123,30 @@ class MistakeRows:
             plain = c.plain * np.stack([np.sin(line), np.cos(line)], axis=-1)
             yield self._candidate(c.mistake, None, plain)
 
+    def rippled(self, e: Array) -> Iterator[Candidate]:
+        """Yield ripples of hinges, of the waves that residuals e, shape (r,), have most of."""
+        if self.parts[0].signals.log.poses:
+            return
+        for mistake, sizes in (COGGING, [np.ones_like(x) for x in self._torques]), (COMMUTATION, self._torques):
+            for j, k in likely_waves(self.parts, e, sizes, self._cutoff):
+                if j not in self.basis.slides:
+                    plain = np.concatenate([_wave(part, j, k, x[j]) for part, x in zip(self.parts, sizes, strict=True)])
+                    yield self._candidate(mistake._replace(setting=float(k)), j, plain)
+
+    @cached_property
+    def _torques(self) -> list[Array]:
+        """Predicted torques of each log at its samples, shape (joint, time)."""
+        return [torques(self.basis, part.signals.state, self.X) for part in self.parts]
+
     @property
     def looks(self) -> int:
-        """How many collisions, and motions of the base, are looked for."""
+        """How many collisions, motions of the base and ripples are looked for."""
         kinds, count = self.parts[0].rows.kinds, len(self._time)
-        return count + 3 * count // (2 * kinds)
+        return count + 3 * count // (2 * kinds) + 2 * self.basis.n * len(WAVES)
+
+    @property
+    def _cutoff(self) -> float:
+        return getattr(self.parts[0].problem.own_chain.operator, "cutoff", None) or USUAL
 
     @property
     def _step(self) -> float:
@@ -167,8 +194,7 @@ class MistakeRows:
 
     def _motion(self, part: LogRows) -> tuple[FittedMotion, int]:
         """Return the fitted motion of a log at some of its samples, one of how many."""
-        cutoff = getattr(part.problem.own_chain.operator, "cutoff", None) or USUAL
-        thin = max(1, int(part.signals.fs / (RATE * cutoff)))
+        thin = max(1, int(part.signals.fs / (RATE * self._cutoff)))
         state = part.signals.state
         q, qd, qdd = (np.ascontiguousarray(x[..., ::thin]) for x in (state.q, state.qd, state.qdd))
         conditions = {name: x[..., ::thin] for name, x in state.conditions.items()}
@@ -187,6 +213,14 @@ def held_torque(part: LogRows) -> Array:
     """Return the rows of the torque of parameters that are held, and of laws about their shapes: measured ones less Y."""
     to_rows = part.rows.maps[0]
     return np.asarray(to_rows.measurement(to_rows.signals.torque.mean) - part.rows.Y)
+
+
+def _wave(part: LogRows, j: int, k: int, size: Array) -> Array:
+    """Return the rows of sine and cosine of k waves a turn in the torque of a joint, shape (r, 2)."""
+    to_rows, q = part.rows.maps[0], part.signals.state.q
+    whole = np.zeros((2, *q.shape))
+    whole[:, j] = size * np.sin(k * q[j]), size * np.cos(k * q[j])
+    return to_rows.measurement(whole).T
 
 
 def _filtered(part: LogRows, columns: Sequence[Rows], t: Array, thin: int) -> Iterator[Array]:

@@ -12,11 +12,9 @@ from idbench.identify.judge.mistake_columns import (
     CREEP,
     LONG,
     PRESLIDING,
-    TURNS,
     Columns,
     asymmetric,
     backlash,
-    cogging,
     coupled,
     drag,
     eccentric,
@@ -33,6 +31,7 @@ from idbench.identify.judge.mistake_columns import (
     position_scale,
     position_zero,
     pushed,
+    ripple,
     rms,
     tilt,
     turning,
@@ -84,7 +83,6 @@ OF_JOINTS: tuple[Mistake, ...] = (
     Mistake("warming", of_joint(lambda m, j: (m.t - m.t[0]) * m.state.qd[j]), "N m/rad", "friction"),
     Mistake("warming", of_joint(lambda m, j: (m.t - m.t[0]) * np.sign(m.state.qd[j])), "N m/s", "friction"),
     *(Mistake("hysteresis", of_joint(turning(share)), "N m", "friction", positive=True) for share in PRESLIDING),
-    *(Mistake("cogging", partial(cogging, waves=k), "N m", "drive", k) for k in TURNS),
     Mistake("backlash", backlash, "rad", "drive", positive=True),
     Mistake("elasticity", elasticity, "rad/(N m)", "drive", positive=True),
     *(Mistake("length", partial(link_length, axis=axis), "m", "link", axis, most=LONG) for axis in range(3)),
@@ -92,8 +90,10 @@ OF_JOINTS: tuple[Mistake, ...] = (
 )
 """Mistakes of a joint."""
 
+TILT = Mistake("tilt", tilt, "rad", "base")
+
 OF_ROBOT: tuple[Mistake, ...] = (
-    Mistake("tilt", tilt, "rad", "base"),
+    TILT,
     Mistake("delay", lambda m, _: whole_rows(-m.rate(m.torque)), "s"),
     Mistake("warming", lambda m, _: whole_rows((m.t - m.t[0]) * (m.torque - m.load)), "1/s", "friction"),
     Mistake("load", of_every(lambda m, j: np.abs(m.load[j]) * np.sign(m.state.qd[j])), "1", "friction", positive=True),
@@ -109,6 +109,9 @@ OF_ROBOT: tuple[Mistake, ...] = (
 
 FROM_AN_INSTANT: tuple[Mistake, ...] = (Mistake("payload", payload, "kg", "link"),)
 """Mistakes that are looked for from each of some instants on; the zero of a joint, which is a slip then, is one, too."""
+
+COGGING = Mistake("cogging", ripple, "N m", "drive")  # Of `setting` waves a turn, those that residuals have most of
+COMMUTATION = Mistake("commutation", ripple, "1", "drive", most=0.5)  # The same in the torque constant
 
 COLLISION = Mistake("collision", of_joint(lambda m, _: np.ones_like(m.t)), "N m")
 """A torque that acts for a moment, where residuals are largest."""

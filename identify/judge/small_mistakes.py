@@ -110,7 +110,7 @@ class _Search:
         Q = np.linalg.qr(W)[0]
         e = self._Y - Q @ (Q.T @ self._Y)
         own = e[: len(e) - self._known]
-        candidates = [*every, *self.rows.pushed(own), *self.rows.shaken(own)]
+        candidates = [*every, *self.rows.pushed(own), *self.rows.shaken(own), *self.rows.rippled(own)]
         each = ((c, i % SOME == 0) for i, c in enumerate(candidates))
         return [one for c, of_all in each if (one := self._tested(c, Q, e, of_all=of_all)) is not None]
 
@@ -244,7 +244,7 @@ class _Search:
             best.gain,
             candidate.mistake.setting,
             *self.rows.place(candidate.instant),
-            candidate.plain @ best.size - self._plain @ self._absorbed(candidate.white @ best.size),
+            explained=candidate.plain @ best.size - self._plain @ self._absorbed(candidate.white @ best.size),
         )
 
     def _size_of(self, best: _Tested) -> tuple[float, ...]:

@@ -33,6 +33,28 @@ def errors_of_stretches(problem: Problem, white: Array, Y: Array, plain: Array) 
     return np.asarray(100 * np.sqrt(np.maximum(squares, TINY) / np.maximum(of_all, TINY)))
 
 
+def noise_errors(problem: Problem) -> Array:
+    """Rms of the noise in the rows of each joint [% of its torque], shape (joint,)."""
+    rows, explicit = problem.explicit.rows, problem.explicit
+    variance = np.concatenate([part.noisy.variance(explicit.noise) for part in explicit.parts])
+    squares, of_all = (np.sum(rows.by_kind(x * rows.valid), axis=-1) for x in (variance, rows.Y**2))
+    return np.asarray(100 * np.sqrt(squares / np.maximum(of_all, TINY)))
+
+
+def left_unexplained(before: Array, after: Array, noise: Array) -> Array:
+    """Share of the squared errors beyond noise that is left once something is mended, joint by joint; 1 where there were none.
+
+    Parameters
+    ----------
+    before, after : Array, shape (joint,)
+        Errors on stretches that were not fitted [%].
+    noise : Array, shape (joint,)
+        What noise makes of them [%].
+    """
+    beyond, rest = (np.maximum(x**2 - noise**2, 0.0) for x in (before, after))
+    return np.divide(rest, beyond, out=np.ones_like(rest), where=beyond > 0)
+
+
 def scatter_of_sums(part: LogRows, left: Array, rest: Array) -> Array:
     """Return the covariance of left' rest, rest being as correlated as it is, and not less than white, shape (g, g)."""
     to_rows = part.rows.maps[0]
@@ -50,3 +72,21 @@ def scatter_of_sums(part: LogRows, left: Array, rest: Array) -> Array:
     total = white + sum((w * (x + x.T) for w, x in zip(taper[1:], each[1:], strict=True)), start=np.zeros(()))
     values, axes = np.linalg.eigh(total / np.outer(size, size))
     return np.asarray((axes * np.maximum(values, 1.0)) @ axes.T * np.outer(size, size))
+
+
+def variance_of_sums(e: Array, step: float) -> Array:
+    """Variance of sums of residuals, over that of as many white ones, at least 1, shape (joint,).
+
+        1 + 2 sum_l w(l) rho(l),   w a Hann taper of `MEMORY`
+
+    Parameters
+    ----------
+    e : Array, shape (joint, row)
+        Residuals.
+    step : float
+        Time from row to row [s].
+    """
+    lags = min(max(2, int(MEMORY / step)), e.shape[1])
+    taper = 0.5 + 0.5 * np.cos(np.pi * np.arange(lags) / lags)
+    sums = np.stack([np.sum(e[:, k:] * e[:, : e.shape[1] - k], axis=1) for k in range(lags)], axis=1)
+    return np.maximum(1.0, 2 * sums @ taper / np.maximum(sums[:, 0], TINY) - 1)

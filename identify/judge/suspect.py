@@ -32,10 +32,12 @@ class Suspect:
     evidence: float
     """What it takes of minus twice the logarithm of the likelihood."""
     setting: float = 0.0
-    """Of cogging: waves a turn; of a length: along which axis."""
+    """Of a ripple: waves a turn; of a length: along which axis."""
     instant: float | None = None
     """When it happened in a log, or from when on it is there [s]."""
     log: int | None = None
     """In which of several logs, from 0."""
+    gains: tuple[tuple[float, ...], ...] = ()
+    """By what every torque is to be multiplied, joint by joint: several ways where the log cannot tell them apart."""
     explained: Array | None = field(default=None, compare=False, repr=False)
     """What it explains of the residuals of the explicit model's rows, where it is small, shape (r,) [N m]."""

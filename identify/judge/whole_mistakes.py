@@ -8,12 +8,16 @@ from math import ceil
 import numpy as np
 import numpy.typing as npt
 
-from idbench.identify.arrays import Array
+from idbench.identify.arrays import TINY, Array
 from idbench.identify.basis.basis import Basis
 from idbench.identify.estimators.problem import Problem
 from idbench.identify.judge.fitted_motion import on_tree, tree_of, with_first_link_moments
-from idbench.identify.judge.stretches import held_out_errors
+from idbench.identify.judge.mistake_columns import rotation
+from idbench.identify.judge.mistake_rows import MistakeRows
+from idbench.identify.judge.mistakes import TILT
+from idbench.identify.judge.stretches import held_out_errors, left_unexplained, noise_errors
 from idbench.identify.judge.suspect import Suspect
+from idbench.identify.judge.torque_gains import DECISIVE, TorqueGains
 from idbench.identify.minimum import minimum
 from idbench.identify.rows.factors import CONVERGED
 
@@ -21,20 +25,21 @@ POOR = 5.0
 """Residuals [% of a joint's torque] above which more is tried than signs of torques, also where no small mistake shows: a wrong
 axis leaves tens."""
 
-DECISIVE = 40.0
-"""What a mistake takes of minus twice the logarithm of the likelihood at least: with rows that are correlated over ten of their
-steps, four sigma of independent ones."""
-
 RATES = (0.8, 0.9, 0.95, 1.05, 1.1, 1.25)  # Rates of the clock, over the stated one, that are tried where something is wrong
 RATE_STEP = 0.07  # How far from the best of them, as a share, a better one is looked for: as far as to the next
 NEARLY = 0.6  # Share of what a small mistake takes of the likelihood from which on a large one is its alternative
+NEARLY_ALL = 0.9  # Share of what the most likely mistake takes from which on another explains as much
+MIRRORED = 0.1  # Distance from -1 of a gain that is called a wrong sign alone
 MOST = 3  # Large mistakes that are tried on held-out stretches, the most likely first
 ENOUGH = 20.0  # Rows a parameter with which many mistakes are looked for before all of a log is asked
 
-NOTHING_LEFT = 1 / 3
-"""Share of the largest error that the right sign or axis leaves at most: a wrong one also explains a part of other mistakes."""
+NOTHING_LEFT = 1 / 9
+"""Share of squared errors beyond noise that the right sign or axis leaves at most: a wrong one also explains a part of other
+mistakes."""
 
 GRAVITY = 9.81  # [m/s^2]
+TURNS, SETTLED = 8, 1.0  # Steps of its direction at most, and what each must take of the misfit
+LARGEST_TURN = 0.7  # [rad] in one of them: half of the way from one axis to the next
 ALMOST_NONE = 1e-3  # Share of gravity in torques that are without it: so little that parameters stay apart
 
 
@@ -46,6 +51,8 @@ class _Tried:
     size: tuple[float, ...]
     problem: Problem
     """The problem as it would be without the mistake."""
+    gains: tuple[tuple[float, ...], ...] = ()
+    """What torques are multiplied by, in the ways that explain the same."""
 
     @property
     def key(self) -> tuple[str, str, int | None, tuple[float, ...]]:
@@ -53,37 +60,57 @@ class _Tried:
         return self.cause, self.of, self.joint, self.size
 
     def misfit(self, rows: npt.NDArray[np.intp]) -> float:
-        """Return minus twice the log-likelihood without the mistake, as of so many rows of each kind; its rows are not kept."""
-        return float(self.problem.with_logs(self.problem.logs).factors.misfit(rows))
+        """Return minus twice the log-likelihood without the mistake, as of so many rows of each kind; its rows are not kept.
+
+        Of torques as they were logged: d tau = d (a tau) / a.
+        """
+        scale = np.log(np.abs(self.gains[0])) if self.gains else np.zeros(1)
+        return float(self.problem.with_logs(self.problem.logs).factors.misfit(rows)) - 2 * float(np.sum(rows * scale))
 
 
-def whole_mistake(problem: Problem, small: Suspect | None = None) -> Suspect | None:
-    """Return the mistake without which the rows are by far most likely, by more than a `small` one; None where none is.
+def whole_mistakes(problem: Problem, small: Suspect | None = None) -> list[Suspect]:
+    """The mistake without which the rows are by far most likely, by more than a `small` one; several are of torques together.
 
-    One that explains nearly as much as the small one is an alternative of it, which then is returned.
+    One that explains nearly as much as the small one is an alternative of it, which then is returned. Of those that explain
+    nearly the same, the first is taken: simple and common ones are tried first.
     """
     explicit = problem.explicit
     before, counts = float(explicit.factors.misfit()), explicit.factors.rows
-    tried = [*_signs(explicit), *_gravities(explicit), *(_rates(explicit) if small else ())]
+    tried = [*_gains(explicit), *_gravities(explicit), *(_rates(explicit) if small else ())]
     if small or _worst(explicit) > POOR:
-        tried += _likely(explicit)
+        tried += [*_likely(explicit), *_tilted(explicit)]
     gains = [before - each.misfit(counts) for each in tried]
-    found = sorted(zip(gains, tried, strict=True), key=lambda one: -one[0])
-    before_errors = held_out_errors(explicit)
+    most = max(gains, default=0.0)
+    found = sorted(zip(gains, tried, strict=True), key=lambda one: -one[0] if one[0] < NEARLY_ALL * most else -np.inf)
+    before_errors, noise = held_out_errors(explicit), noise_errors(explicit)
     for gain, best in found[:MOST]:
         if gain < DECISIVE or (small and gain < NEARLY * small.evidence):
             break
         errors = held_out_errors(best.problem)
         k = int(np.argmax(np.log(before_errors) - np.log(errors)))
-        if errors[k] > NOTHING_LEFT * before_errors[k]:
+        if left_unexplained(before_errors, errors, noise)[k] > NOTHING_LEFT:
             continue
         if small and gain < DECISIVE + small.evidence:
-            return replace(small, alternatives=(*small.alternatives, (best.cause, best.joint)))
-        near = [(each.cause, each.joint) for other, each in found if other > 0.9 * gain and each is not best]
+            return [replace(small, alternatives=(*small.alternatives, (best.cause, best.joint)))]
+        near = [(each.cause, each.joint) for other, each in found if other > NEARLY_ALL * gain and each is not best]
         others = tuple(key for key in dict.fromkeys(near) if key != (best.cause, best.joint))
         pair, unit = (float(before_errors[k]), float(errors[k])), "rad" if best.cause == "zero" else "1"
-        return Suspect(best.cause, best.of, best.joint, best.size, (0.0,), unit, 0.0, float(np.sqrt(gain)), others, pair, gain)
-    return None
+        t = float(np.sqrt(gain))
+        one = Suspect(best.cause, best.of, best.joint, best.size, (0.0,), unit, 0.0, t, others, pair, gain, gains=best.gains)
+        return _torque_by_torque(one) if best.gains else [one]
+    return []
+
+
+def _torque_by_torque(gains: Suspect) -> list[Suspect]:
+    """The mistake of each torque that is multiplied by something."""
+    found = list[Suspect]()
+    for j, gain in enumerate(gains.gains[0]):
+        if gain != 1:
+            cause, size = ("sign", -1.0) if abs(gain + 1) < MIRRORED else ("gain", 1 / gain - 1)
+            rivals = [("gain", k) for other in gains.gains[1:] for k, x in enumerate(other) if x != 1 and k != j]
+            others = tuple(dict.fromkeys([*rivals, *gains.alternatives]))
+            found.append(replace(gains, cause=cause, joint=j, size=(size,), alternatives=others))
+    return found
 
 
 def _likely(problem: Problem) -> Iterator[_Tried]:
@@ -122,16 +149,11 @@ def _changed(problem: Problem, q: Array | None = None, tau: Array | None = None)
     return problem.with_logs(logs)
 
 
-def _signs(problem: Problem) -> Iterator[_Tried]:
-    """Yield the torque of each joint with the other sign: of the factors alone the last column changes."""
-    n, factors = problem.basis.n, problem.factors
-    held = bool(problem.basis.held)  # whose torque keeps its sign
-    for j in range(n):
-        R = factors.R.copy()
-        R[j, :, -1] *= -1
-        flipped = replace(factors, R=R, _fits=[])
-        if held or flipped.misfit() < factors.misfit() - DECISIVE:
-            yield _Tried("sign", "torque", j, (-1.0,), _changed(problem, tau=_diagonal(n, j)))
+def _gains(problem: Problem) -> Iterator[_Tried]:
+    """Yield other gains of the torques, those that are most likely, negative ones among them."""
+    if choices := TorqueGains.of(problem).choices():
+        gains = [tuple((1 / factors).tolist()) for factors in choices]
+        yield _Tried("gain", "torque", None, (), _changed(problem, tau=np.diag(gains[0])), tuple(gains))
 
 
 def _diagonal(n: int, j: int) -> Array:
@@ -163,6 +185,7 @@ def _exchanged(problem: Problem) -> Iterator[_Tried]:
         order[[j, k]] = k, j
         yield _Tried("exchanged", "torque", j, (k + 1.0,), _changed(problem, tau=np.eye(n)[order]))
         yield _Tried("exchanged", "position", j, (k + 1.0,), _changed(problem, q=np.eye(n)[order]))
+        yield _Tried("exchanged", "joint", j, (k + 1.0,), _changed(problem, q=np.eye(n)[order], tau=np.eye(n)[order]))
 
 
 def _gravities(problem: Problem) -> Iterator[_Tried]:
@@ -182,18 +205,57 @@ def _across(problem: Problem) -> Iterator[_Tried]:
     yield from (_with_gravity(problem, basis, sign * g * a) for a in axes for sign in (1, -1))
 
 
+def _tilted(problem: Problem) -> Iterator[_Tried]:
+    """Yield the most likely direction of gravity: [X; tilt] by least squares, turn by turn."""
+    tree, counts = tree_of(problem.basis), problem.factors.rows
+    if tree is None or not np.any(tree.gravity):
+        return
+    basis = problem.basis if problem.prior else with_first_link_moments(problem.basis)
+    begins = [_with_gravity(problem, basis, tree.gravity), *_across(problem)]
+    best = min(begins, key=lambda one: one.misfit(counts))
+    misfit = best.misfit(counts)
+    for _ in range(TURNS):
+        if (tilt := _tilt(best.problem)) is None:
+            break
+        after = _with_gravity(problem, basis, rotation(tilt) @ np.array(best.size))
+        if not (less := after.misfit(counts)) < misfit - SETTLED:
+            break
+        best, misfit = after, less
+    yield best
+
+
+def _tilt(problem: Problem) -> Array | None:
+    """Rotation vector of gravity that the rows show to first order, shape (3,); None where they show none."""
+    fit = problem.factors.fit(CONVERGED)
+    rows = problem.rows
+    candidate = next((c for c in MistakeRows(problem.parts, problem.basis, fit.X).of_robot(TILT)), None)
+    if candidate is None:
+        return None
+    weight = (np.tile(fit.weight, len(rows.time) // rows.kinds) * rows.valid)[:, None]
+    A = np.concatenate([rows.W, candidate.plain[:, :2]], axis=1) * weight
+    sizes = np.linalg.lstsq(A, rows.Y * weight[:, 0])[0][-2:]
+    tree = tree_of(problem.basis)
+    assert tree is not None
+    vector = sizes @ np.linalg.svd(tree.gravity[None])[2][1:]
+    return vector * min(1.0, LARGEST_TURN / max(float(np.linalg.norm(vector)), TINY))
+
+
 def _with_gravity(problem: Problem, basis: Basis, gravity: Array) -> _Tried:
     tree = tree_of(basis)
     assert tree is not None
     elsewhere = problem.with_basis(on_tree(basis, replace(tree, gravity=gravity)))
+    if hidden := elsewhere.factors.together.hidden():  # such as first moments about an axis along which gravity now is
+        elsewhere = elsewhere.with_basis(elsewhere.basis.without(*hidden))
     return _Tried("gravity", "base", None, tuple(gravity.tolist()), elsewhere)
 
 
 def _turned(problem: Problem) -> Iterator[_Tried]:
-    """Yield the position of each joint with the other sign, and from other zeros."""
+    """Yield the position of each joint with the other sign, alone and with its torque, and from other zeros."""
     n = problem.basis.n
     for j in range(n):
         yield _Tried("sign", "position", j, (-1.0,), _changed(problem, q=_diagonal(n, j)))
+        yield _Tried("sign", "joint", j, (-1.0,), _changed(problem, q=_diagonal(n, j), tau=_diagonal(n, j)))
+    for j in range(n):
         for turn in () if j in problem.basis.slides else (np.pi / 2, -np.pi / 2, np.pi):
             moved = [replace(log, q=log.q - turn * (np.arange(n) == j)) for log in problem.logs]
             yield _Tried("zero", "position", j, (turn,), problem.with_logs(moved))

@@ -1,0 +1,61 @@
+"""Ripples of joints' torques: of which numbers of waves a turn residuals have most."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from idbench.identify.arrays import TINY, Array
+from idbench.identify.estimators.log_rows import LogRows, split_by_log
+
+WAVES = np.arange(2, 91)
+"""Waves a turn that are looked for: harmonic drives have 2, motors of 6 to 90 slots without a gear as many."""
+
+LIKELY = 2  # Numbers of waves whose columns are made, for each joint: those that residuals have most of
+APART = 2  # Waves by which these differ: along a short way neighbours look alike
+SEEN = 0.02  # Share of the motion in which a wave must be within the band of the rows
+
+
+def likely_waves(parts: Sequence[LogRows], e: Array, sizes: Sequence[Array], cutoff: float) -> Iterator[tuple[int, int]]:
+    """Yield joints, each with numbers of waves a turn that residuals have most of.
+
+        s_k = |sum_t e(t) x(t) exp(i k q(t))|^2 / sum_t x(t)^2 [k |qd| < 2 pi f_c]
+
+    Rows have what passes the operator, so that e between them is interpolated, and a wave counts where it is in their band.
+
+    Parameters
+    ----------
+    parts : sequence of LogRows
+        The explicit rows of each log.
+    e : Array, shape (r,)
+        Their residuals.
+    sizes : sequence of Array, shape (joint, time)
+        Amplitude of the wave over its size in each log, x: 1, or the torque that a ripple is a share of.
+    cutoff : float
+        Band of the rows, f_c [Hz].
+    """
+    every = zip(parts, split_by_log(e, parts), sizes, strict=True)
+    scores = np.sum([_scores(part, own, x, cutoff) for part, own, x in every], axis=0)
+    for j, score in enumerate(scores):
+        for _ in range(LIKELY):
+            best = int(WAVES[score.argmax()])
+            if score.max() > TINY:
+                yield j, best
+            score[np.abs(WAVES - best) < APART] = 0.0
+
+
+def _scores(part: LogRows, e: Array, size: Array, cutoff: float) -> Array:
+    """Score of each number of waves in one log, shape (joint, wave)."""
+    state, fs, rows = part.signals.state, part.signals.fs, part.rows
+    t, inside = np.arange(state.q.shape[-1]) / fs, rows.maps[0].inside
+    found = np.zeros((len(size), len(WAVES)))
+    for j, x in enumerate(inside * size):
+        own = rows.group == j
+        left, squares = np.interp(t, rows.time[own], e[own]) * x, x**2
+        phase = np.exp(1j * state.q[j])
+        wave = phase ** WAVES[0]
+        for i, k in enumerate(WAVES):
+            seen = float(np.sum(squares[k * np.abs(state.qd[j]) < 2 * np.pi * cutoff]))
+            if seen > SEEN * np.sum(squares):
+                found[j, i] = np.abs(left @ wave) ** 2 / seen
+            wave = wave * phase
+    return found
