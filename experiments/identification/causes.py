@@ -98,7 +98,7 @@ WORDINGS: Mapping[tuple[str, str], Wording] = {
         "its columns are exchanged with those of {other}", by="give the joints in the order of the columns: --joints {joints}"
     ),
     ("missing_torque", "torque"): Wording(
-        "its torque never changes: it was not logged, and its rows are left out", by="log it"
+        "its torque does not follow the motion: it was not logged, and its rows are left out", by="log it"
     ),
 }
 """Every cause of the table of mistakes, and what it is a mistake of."""

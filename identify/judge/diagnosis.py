@@ -1,6 +1,6 @@
 """What is wrong with a fit: large mistakes and small ones; and which torques were not logged."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,8 +12,8 @@ from idbench.identify.data.motion_log import MotionLog, never_logged
 from idbench.identify.estimators.problem import Problem
 from idbench.identify.judge.small_mistakes import small_mistakes
 from idbench.identify.judge.suspect import Suspect
-from idbench.identify.judge.torque_gains import mean_inertias
-from idbench.identify.judge.whole_mistakes import whole_mistakes
+from idbench.identify.judge.torque_gains import DECISIVE, mean_inertias
+from idbench.identify.judge.whole_mistakes import turned_position, whole_mistakes
 
 BALANCED, KNOWN = 0.1, 4.0
 """Share of its terms that a joint without a drive has as residual at most: what balances, balances to its noise; and sigma of
@@ -22,6 +22,7 @@ parameters that count for that: those of a joint whose torque was not logged van
 DRIVING: tuple[Kind, ...] = ("viscous friction", "Coulomb friction")
 """Kinds of friction that are both negative where a torque has the other sign; one may be by a wrong delay."""
 
+UNRELATED = 0.9  # Share of a torque's squares that parameters of its own leave, from which on it does not follow the motion
 MOVES = 100.0  # Standard deviations of the noise of a position beyond which a joint moves, and does not flicker by a count
 SAMPLES = 20.0  # Samples for each period of the operator's cut-off with which large mistakes are looked for
 
@@ -40,15 +41,23 @@ def diagnosed(problem: Problem, X: Array) -> tuple[Suspect, ...]:
     small = small_mistakes(problem, X)
     whole = whole_mistakes(_thinned(problem.explicit), small[0] if small else None)
     if whole and small and (whole[0].cause, whole[0].joint) == (small[0].cause, small[0].joint):
-        small, whole = (whole[0], *small[1:]), []
-    return tuple(whole) or (*_impossible_signs(problem.explicit, X), *small)
+        return (whole[0], *small[1:])
+    return (*whole, *_besides(problem.explicit, whole)) if whole else (*_impossible_signs(problem.explicit, X), *small)
+
+
+def _besides(problem: Problem, whole: Sequence[Suspect]) -> Sequence[Suspect]:
+    """Small mistakes beside wrong gains of the torques, which residuals show once these are right."""
+    if not whole[0].gains:
+        return ()
+    mended = problem.with_logs([replace(log, tau=log.tau * np.array(whole[0].gains[0])) for log in problem.logs])
+    return small_mistakes(mended, mended.factors.fit(2).X)
 
 
 def _impossible_signs(problem: Problem, X: Array) -> Iterator[Suspect]:
-    """Yield joints whose friction would drive them, or whose inertia M_jj would be negative: their torque has the other sign.
+    """Yield joints whose friction would drive them, or whose inertia M_jj would be negative: a sign of theirs is wrong.
 
-    Where others feel little of a joint, all of its parameters change their sign with its torque, and residuals do not show it.
-    Poses at rest show neither.
+    Where others feel little of a joint, all of its parameters change their sign with its torque, and residuals do not show it;
+    that of the position, or both, are the alternatives, or first where they explain more. Poses at rest show neither.
     """
     if any(log.poses for log in problem.logs):
         return
@@ -63,8 +72,17 @@ def _impossible_signs(problem: Problem, X: Array) -> Iterator[Suspect]:
         # A wrong delay takes its share of friction from an inertia, but leaves the friction positive.
         friction, worst = max(t), min(max(t), float(inertias[j]))
         if j not in absent and worst < -KNOWN and friction < KNOWN:
-            p = float(scipy.special.ndtr(worst))
-            yield Suspect("sign", "torque", j, (-1.0,), (0.0,), "1", p, -worst, (), (0.0, 0.0), 0.0)
+            yield _sign(problem, j, worst)
+
+
+def _sign(problem: Problem, j: int, t: float) -> Suspect:
+    """The wrong sign of a joint: of its torque, or of its position where the rows are likelier with that turned."""
+    before, after = float(problem.factors.misfit()), float(turned_position(problem, j).factors.misfit(problem.factors.rows))
+    of, other = ("position", "torque") if before - after > DECISIVE else ("torque", "position")
+    gains = tuple(np.where(np.arange(problem.basis.n) == j, -1.0, 1.0).tolist())
+    p, others = float(scipy.special.ndtr(t)), () if of == "position" else ((f"sign of the {other}", j),)
+    found = Suspect("sign", of, j, (-1.0,), (0.0,), "1", p, -t, others, (0.0, 0.0), 0.0)
+    return replace(found, gains=(gains,)) if of == "torque" else found
 
 
 def _thinned(problem: Problem) -> Problem:
@@ -121,7 +139,15 @@ def unlogged(j: int) -> Suspect:
 
 
 def still_joints(problem: Problem) -> list[int]:
-    """Return the joints that move in a log in which their torque never changes."""
-    least = MOVES * problem.position_noise
+    """Joints that move in a log in which their torque never changes, or does not follow the motion, as noise does not.
+
+    Of the latter even parameters of their own explain next to nothing.
+    """
+    least, factors = MOVES * problem.position_noise, problem.explicit.factors
     moves = [np.max(np.ptp(log.q, axis=-2) > least, axis=tuple(range(log.q.ndim - 2))) for log in problem.logs]
-    return sorted({j for log, own in zip(problem.logs, moves, strict=True) for j in log.unchanging if own[j]})
+    never = {j for log, own in zip(problem.logs, moves, strict=True) for j in log.unchanging if own[j]}
+    for j in set(np.flatnonzero(np.all(moves, axis=0)).tolist()) - never:
+        W, Y = factors.R[j, :, :-1], factors.R[j, :, -1]
+        if np.sum((Y - W @ np.linalg.lstsq(W, Y)[0]) ** 2) > UNRELATED * np.sum(Y**2):
+            never.add(j)
+    return sorted(never)

@@ -38,6 +38,8 @@ from idbench.identify.judge.mistake_columns import (
     whole_rows,
 )
 
+RARE = 3
+
 
 class Mistake(NamedTuple):
     """A mistake, and what it leaves unexplained."""
@@ -56,25 +58,27 @@ class Mistake(NamedTuple):
     """Size above which it is not small, and its column says nothing of it; of a length over the largest of the robot."""
     left: float = 1e-4
     """Share of its column's squares that parameters must leave for it to be distinct from them: less is noise of positions."""
+    rank: int = 2
+    """How seldom it is made, from 0 to `RARE`: of mistakes that explain the same, the more common one is named first."""
     positive: bool = False
     """Whether nothing makes a size below zero, which then is noise of the positions: compliance, play, an inertia, a load."""
 
 
-GAIN = Mistake("gain", of_joint(lambda m, j: m.torque[j]), most=1.0, left=1e-6)  # Torques that are all too large
+GAIN = Mistake("gain", of_joint(lambda m, j: m.torque[j]), most=1.0, left=1e-6, rank=0)  # Torques that are all too large
 
 OF_JOINTS: tuple[Mistake, ...] = (
     GAIN,
-    Mistake("offset", of_joint(lambda m, _: np.ones_like(m.t)), "N m"),
-    Mistake("drift", of_joint(lambda m, _: m.t - m.t[0]), "N m/s"),
-    Mistake("saturation", of_joint(lambda m, j: -(m.torque[j] ** 3)), "1/(N m)^2"),
-    Mistake("dead_band", of_joint(lambda m, j: -np.sign(m.torque[j])), "N m"),
-    Mistake("delay", of_joint(late), "s"),
+    Mistake("offset", of_joint(lambda m, _: np.ones_like(m.t)), "N m", rank=1),
+    Mistake("drift", of_joint(lambda m, _: m.t - m.t[0]), "N m/s", rank=3),
+    Mistake("saturation", of_joint(lambda m, j: -(m.torque[j] ** 3)), "1/(N m)^2", rank=3),
+    Mistake("dead_band", of_joint(lambda m, j: -np.sign(m.torque[j])), "N m", rank=3),
+    Mistake("delay", of_joint(late), "s", rank=1),
     Mistake("delay", late_position, "s", "position"),
     Mistake("zero", position_zero, "rad", "position", most=0.5),
     Mistake("scale", position_scale, "1", "position", most=0.3),
-    Mistake("eccentric", eccentric, "rad", "position", most=0.5),
-    Mistake("rotor", of_joint(lambda m, j: m.state.qdd[j]), "kg m^2", "drive", positive=True),
-    Mistake("coupled_rotor", coupled, "kg m^2", "drive"),
+    Mistake("eccentric", eccentric, "rad", "position", most=0.5, rank=3),
+    Mistake("rotor", of_joint(lambda m, j: m.state.qdd[j]), "kg m^2", "drive", positive=True, rank=1),
+    Mistake("coupled_rotor", coupled, "kg m^2", "drive", rank=3),
     Mistake("spring", of_joint(lambda m, j: m.state.q[j]), "N m/rad", "drive"),
     Mistake("load", of_joint(lambda m, j: np.abs(m.load[j]) * np.sign(m.state.qd[j])), "1", "friction", positive=True),
     *(Mistake("velocity", of_joint(partial(fading, share=share)), "N m", "friction") for share in CREEP),
@@ -82,28 +86,31 @@ OF_JOINTS: tuple[Mistake, ...] = (
     Mistake("asymmetry", of_joint(lambda m, j: np.abs(m.state.qd[j])), "N m s/rad", "friction"),
     Mistake("warming", of_joint(lambda m, j: (m.t - m.t[0]) * m.state.qd[j]), "N m/rad", "friction"),
     Mistake("warming", of_joint(lambda m, j: (m.t - m.t[0]) * np.sign(m.state.qd[j])), "N m/s", "friction"),
-    *(Mistake("hysteresis", of_joint(turning(share)), "N m", "friction", positive=True) for share in PRESLIDING),
-    Mistake("backlash", backlash, "rad", "drive", positive=True),
-    Mistake("elasticity", elasticity, "rad/(N m)", "drive", positive=True),
-    *(Mistake("length", partial(link_length, axis=axis), "m", "link", axis, most=LONG) for axis in range(3)),
-    Mistake("axis", link_axis, "rad", "link", most=0.5),
+    *(Mistake("hysteresis", of_joint(turning(share)), "N m", "friction", positive=True, rank=3) for share in PRESLIDING),
+    Mistake("backlash", backlash, "rad", "drive", positive=True, rank=3),
+    Mistake("elasticity", elasticity, "rad/(N m)", "drive", positive=True, rank=3),
+    *(Mistake("length", partial(link_length, axis=axis), "m", "link", axis, most=LONG, rank=3) for axis in range(3)),
+    Mistake("axis", link_axis, "rad", "link", most=0.5, rank=3),
 )
 """Mistakes of a joint."""
 
-TILT = Mistake("tilt", tilt, "rad", "base")
+TILT = Mistake("tilt", tilt, "rad", "base", rank=1)
 
 OF_ROBOT: tuple[Mistake, ...] = (
     TILT,
-    Mistake("delay", lambda m, _: whole_rows(-m.rate(m.torque)), "s"),
+    Mistake("delay", lambda m, _: whole_rows(-m.rate(m.torque)), "s", rank=0),
     Mistake("warming", lambda m, _: whole_rows((m.t - m.t[0]) * (m.torque - m.load)), "1/s", "friction"),
     Mistake("load", of_every(lambda m, j: np.abs(m.load[j]) * np.sign(m.state.qd[j])), "1", "friction", positive=True),
     *(Mistake("velocity", of_every(partial(fading, share=share), friction), "1", "friction") for share in CREEP),
     Mistake("velocity", of_every(lambda m, j: m.state.qd[j] * np.abs(m.state.qd[j]), drag), "1", "friction"),
     Mistake("asymmetry", asymmetric, "1", "friction"),
-    *(Mistake("hysteresis", of_every(turning(share), friction), "1", "friction", positive=True) for share in PRESLIDING),
-    Mistake("saturation", of_every(lambda m, j: -(m.torque[j] ** 3), lambda m, j: 1 / rms(m.torque[j]) ** 2), "1"),
+    *(
+        Mistake("hysteresis", of_every(turning(share), friction), "1", "friction", positive=True, rank=3)
+        for share in PRESLIDING
+    ),
+    Mistake("saturation", of_every(lambda m, j: -(m.torque[j] ** 3), lambda m, j: 1 / rms(m.torque[j]) ** 2), "1", rank=3),
     Mistake("rate", lambda m, _: whole_rows(m.faster()), "1", "clock", most=0.3),
-    Mistake("clock_drift", lambda m, _: whole_rows(-(m.t - m.t[0]) * m.rate(m.torque)), "s/s", "clock"),
+    Mistake("clock_drift", lambda m, _: whole_rows(-(m.t - m.t[0]) * m.rate(m.torque)), "s/s", "clock", rank=3),
 )
 """Mistakes of the whole robot, or of all torques."""
 
@@ -113,8 +120,10 @@ FROM_AN_INSTANT: tuple[Mistake, ...] = (Mistake("payload", payload, "kg", "link"
 COGGING = Mistake("cogging", ripple, "N m", "drive")  # Of `setting` waves a turn, those that residuals have most of
 COMMUTATION = Mistake("commutation", ripple, "1", "drive", most=0.5)  # The same in the torque constant
 
-COLLISION = Mistake("collision", of_joint(lambda m, _: np.ones_like(m.t)), "N m")
+COLLISION = Mistake("collision", of_joint(lambda m, _: np.ones_like(m.t)), "N m", rank=3)
 """A torque that acts for a moment, where residuals are largest."""
 
-BASE: tuple[Mistake, ...] = tuple(Mistake("base_motion", partial(pushed, axis=axis), "m/s^2", "base") for axis in range(3))
+BASE: tuple[Mistake, ...] = tuple(
+    Mistake("base_motion", partial(pushed, axis=axis), "m/s^2", "base", rank=3) for axis in range(3)
+)
 """Motion of the base, at the frequencies that residuals have."""

@@ -13,8 +13,8 @@ from idbench.identify.estimators.log_rows import split_by_log
 from idbench.identify.estimators.problem import Problem
 from idbench.identify.judge.delay_step import torque_lateness
 from idbench.identify.judge.mistake_rows import Candidate, MistakeRows, held_torque
-from idbench.identify.judge.mistakes import COLLISION, GAIN
-from idbench.identify.judge.stretches import errors_of_stretches, scatter_of_sums
+from idbench.identify.judge.mistakes import COLLISION, GAIN, RARE
+from idbench.identify.judge.stretches import errors_of_stretches, left_unexplained, noise_errors, scatter_of_sums
 from idbench.identify.judge.suspect import Suspect
 
 APART = 1e-2
@@ -29,8 +29,10 @@ WORTH, MATTERS = 0.98, 0.02
 """Share of an error on stretches that were not fitted that a mistake may leave, and error [%] below which none matters: a chain
 has errors of its own, of some 1e-5 %, and no drive is known to a fiftieth of a per cent."""
 
+PROOF = 0.25  # Share of squared held-out errors beyond noise, at the joint where they fall most, that a named mistake may leave
 PUSHED = 0.02  # Torque of a push, over the rms of the joint's, above which it is one: less is what any model leaves somewhere
 ALIKE = 0.8  # Share of what a mistake explains that another one must explain to be its alternative
+NEARLY_ALL = 0.95  # Share of what the most likely one takes from which on a more common one is named before it
 MOST = 3  # Mistakes that are looked for, one beside the other
 MEDIAN = 0.4549  # Of chi squared with one degree of freedom
 FEWEST, MANY = 2, 100_000  # Rows a parameter, and rows at most: hundreds of columns of as many take a GB
@@ -84,12 +86,13 @@ class _Search:
     rows: MistakeRows
     every: Sequence[Candidate]
 
-    def found(self) -> Iterator[Suspect]:
-        """Yield mistakes, each the most likely one beside those before: c(k+1) = argmax gain(c | W, c(1), ..., c(k)).
+    def found(self) -> list[Suspect]:
+        """Mistakes, each the most likely one beside those before: c(k+1) = argmax gain(c | W, c(1), ..., c(k)).
 
         It counts if it is as sure beside what the tests of all others scatter once it is explained: of noise they scatter by 1.
+        It is named if, beside the others, at least half of the error that nothing else explains goes (`PROOF`).
         """
-        every, taken = self.every, list[Candidate]()
+        every, taken, found = self.every, list[Candidate](), list[Suspect]()
         tested = self._all_tested(every, taken)
         while len(taken) < MOST:
             for best, errors in self._proved(tested, taken):
@@ -97,12 +100,29 @@ class _Search:
                 left = self._all_tested(rest, [*taken, best.candidate])
                 p = self._by_chance(best.left.shape[1], best.chi2 / _scatter_of(left))
                 if p < CERTAIN:
-                    yield self._suspect(best, tested, errors, p)
+                    found.append(self._suspect(best, tested, errors, p))
                     break
             else:
-                return
+                break
             every, tested = rest, left
             taken.append(best.candidate)
+        return self._named(found, taken)
+
+    def _named(self, found: Sequence[Suspect], taken: Sequence[Candidate]) -> list[Suspect]:
+        """Those that are proved beside the others; without the least proved one, the others must be."""
+        if not found:
+            return []
+        noise, after = noise_errors(self.problem), self._held_out(taken)
+        shares = list[float]()
+        for k, candidate in enumerate(taken):
+            before = self._held_out([*taken[:k], *taken[k + 1 :]])
+            j = int(np.argmax(np.log(before) - np.log(after)))
+            once = candidate.mistake is COLLISION  # which nothing predicts that happened before or after
+            shares.append(0.0 if once else float(left_unexplained(before, after, noise)[j]))
+        worst = int(np.argmax(shares))
+        if shares[worst] <= PROOF:
+            return list(found)
+        return self._named([*found[:worst], *found[worst + 1 :]], [*taken[:worst], *taken[worst + 1 :]])
 
     def _all_tested(self, every: Sequence[Candidate], taken: Sequence[Candidate]) -> list[_Tested]:
         """Return tests of mistakes beside others."""
@@ -110,7 +130,9 @@ class _Search:
         Q = np.linalg.qr(W)[0]
         e = self._Y - Q @ (Q.T @ self._Y)
         own = e[: len(e) - self._known]
-        candidates = [*every, *self.rows.pushed(own), *self.rows.shaken(own), *self.rows.rippled(own)]
+        there = {(c.key, c.mistake.setting) for c in taken}
+        looked_for = (*self.rows.pushed(own), *self.rows.shaken(own), *self.rows.rippled(own))
+        candidates = [*every, *(c for c in looked_for if (c.key, c.mistake.setting) not in there)]
         each = ((c, i % SOME == 0) for i, c in enumerate(candidates))
         return [one for c, of_all in each if (one := self._tested(c, Q, e, of_all=of_all)) is not None]
 
@@ -122,7 +144,12 @@ class _Search:
         """Yield the sure ones, the most likely first, that predict stretches better that were not fitted, and errors [%]."""
         before = self._held_out(taken)
         sure = [t for t in tested if t.gain > 0 and self._by_chance(t.left.shape[1], t.chi2) < CERTAIN]
-        for one in sorted(sure, key=lambda t: -t.gain)[:MOST]:
+        most = max((t.gain for t in sure), default=0.0)
+        # Of those that explain nearly the same, the most common comes first.
+        by_rank = sorted(
+            sure, key=lambda t: (t.candidate.mistake.rank, -t.gain) if t.gain > NEARLY_ALL * most else (RARE, -t.gain)
+        )
+        for one in by_rank[:MOST]:
             after = self._held_out([*taken, one.candidate])
             # What happened once cannot be predicted; without it, the rest is.
             j = int(np.argmax(np.log(before) - np.log(after)))

@@ -164,7 +164,7 @@ class TorqueGains:
                 share /= 2
             if not after < misfit - SETTLED * len(self.counts):
                 break
-            X, a, misfit = X + share * dX, a + share * da, after
+            X, a, misfit = X + share * dX, np.where(self.free, a + share * da, a), after
         return X, a
 
     def _step(self, X: Array, a: Array, weight: Array) -> tuple[Array, Array]:

@@ -249,11 +249,16 @@ def _with_gravity(problem: Problem, basis: Basis, gravity: Array) -> _Tried:
     return _Tried("gravity", "base", None, tuple(gravity.tolist()), elsewhere)
 
 
+def turned_position(problem: Problem, j: int) -> Problem:
+    """The problem with the other sign of a position."""
+    return _changed(problem, q=_diagonal(problem.basis.n, j))
+
+
 def _turned(problem: Problem) -> Iterator[_Tried]:
     """Yield the position of each joint with the other sign, alone and with its torque, and from other zeros."""
     n = problem.basis.n
     for j in range(n):
-        yield _Tried("sign", "position", j, (-1.0,), _changed(problem, q=_diagonal(n, j)))
+        yield _Tried("sign", "position", j, (-1.0,), turned_position(problem, j))
         yield _Tried("sign", "joint", j, (-1.0,), _changed(problem, q=_diagonal(n, j), tau=_diagonal(n, j)))
     for j in range(n):
         for turn in () if j in problem.basis.slides else (np.pi / 2, -np.pi / 2, np.pi):
