@@ -7,59 +7,13 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.servo.servo_files import values_of
 from idbench.identify.files.servo_file import ServoFile
 from idbench.identify.plugins import did_you_mean
-from idbench.identify.servo import ServoFit
-from idbench.identify.servo.parameters import SERVO_PARAMETERS
 from idbench.sim.robot.servos import with_servos
 
 BENCH = "pendulum"  # Robot to whose joint a servo is written where none is named
-
-
-def described(
-    name: str, source: str, known: Mapping[str, Any], units: Sequence[ServoFit], held_out_error: float
-) -> dict[str, Any]:
-    """Content of a device's file.
-
-    Parameters
-    ----------
-    name, source : str
-        Its name, and where its logs are from.
-    known : mapping of str to Any
-        What servo.toml states of it.
-    units : sequence of ServoFit
-        The fit of each unit that was logged, with the same parameters.
-    held_out_error : float
-        Mean error of positions of runs that fits did not see [rad].
-    """
-    first = units[0]
-    values = np.array([[fit.p[letter] for letter in first.p] for fit in units])
-    sigma = first.standard_errors
-    spread = np.std(values, axis=0, ddof=1) if len(units) > 1 else np.full(len(first.p), np.nan)
-    return {
-        "name": name,
-        "source": source,
-        "known": dict(known),
-        "friction": first.friction,
-        "units": len(units),
-        "held_out_error": held_out_error,
-        "parameters": {
-            letter: {
-                "value": float(np.mean(x)),
-                "sigma": sigma.get(letter),
-                "spread": None if np.isnan(s) else float(s),
-                "unit": SERVO_PARAMETERS[letter].unit,
-            }
-            for letter, x, s in zip(first.p, values.T, spread, strict=True)
-            if letter != "offset"  # of the bench, not of the servo
-        },
-        "free": list(first.free),
-        "covariance": np.asarray(first.covariance).tolist(),
-    }
 
 
 @cache
