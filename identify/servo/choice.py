@@ -10,7 +10,7 @@ from scipy.stats import wilcoxon
 from idbench.identify.arrays import Array
 from idbench.identify.servo.fit import ServoFit
 from idbench.identify.servo.left_out import left_out, stretches
-from idbench.identify.servo.parameters import SERVO_FRICTIONS, SIMPLER, parameters_of
+from idbench.identify.servo.parameters import SERVO_FRICTIONS, parameters_of
 from idbench.identify.servo.run import ServoRun
 from idbench.identify.servo.stages import Stages
 
@@ -87,14 +87,10 @@ def choose_friction(
     IdentificationError
         As for `identify_servo`.
     """
-    fits = dict[str, ServoFit]()
-    rough = dict[str, dict[str, float]]()
     of_laws = {name for names in SERVO_FRICTIONS.values() for name in names}
     parameters_of("coulomb", (*more, *(name for name in held or {} if name not in of_laws)))
-    stages = Stages.begun(runs, more, held or {})
-    for law in SERVO_FRICTIONS:  # simpler ones come first
-        rough[law] = stages.go(law, (), rough[SIMPLER[law]] if law in SIMPLER else stages.start)
-        fits[law] = stages.fit(law, more, stages.go(law, more, rough[law]) if more else rough[law])
+    stages = Stages.start(runs, more, held or {})
+    fits = {law: stages.fit(law, more) for law in SERVO_FRICTIONS}
     c = 3 * float(np.median([fit.scale for fit in fits.values()]))  # one measure for all
     clusters = PER_PARAMETER * max(len(fit.free) for fit in fits.values())
     parts = min(stretches(fit.found, fit.loop, clusters) for fit in fits.values())  # the same parts of the log for all laws

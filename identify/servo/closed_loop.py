@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from idbench.identify.arrays import Array
+from idbench.identify.servo.parameters import SERVO_PARAMETERS
 from idbench.identify.servo.run import ServoRun
 
 if TYPE_CHECKING:
@@ -67,14 +68,14 @@ class ServoLoop:
         """Signals of the runs, shape (run, sample), each with its last value after its end."""
         return np.stack([np.pad(x, (0, self.samples - len(x)), mode="edge") for x in signals])
 
-    def limits(self, limits: Array, free: Sequence[str]) -> Array:
-        """Return limits of parameters, shape (2, p), those of the offset by the ranges of the joint."""
-        found = limits.copy()
-        if "offset" in free:
+    def limits(self, names: Sequence[str]) -> Array:
+        """Smallest and largest values of parameters, shape (2, p), those of the offset by the ranges of the joint."""
+        limits = np.array([[SERVO_PARAMETERS[name].low, SERVO_PARAMETERS[name].high] for name in names]).reshape(-1, 2).T
+        if "offset" in names:
             low, high = zip(*(run.offsets for run in self.runs), strict=True)
-            k = list(free).index("offset")
-            found[:, k] = max(found[0, k], *low), min(found[1, k], *high)
-        return found
+            k = list(names).index("offset")
+            limits[:, k] = max(limits[0, k], *low), min(limits[1, k], *high)
+        return limits
 
     def simulate(self, p: Mapping[str, npt.ArrayLike], ahead: npt.ArrayLike = 0.0) -> Array:
         """Return positions at the samples of the log [rad], shape (lane, run, sample), for a value of each parameter a lane.

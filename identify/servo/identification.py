@@ -9,7 +9,7 @@ import numpy as np
 from idbench.identify.arrays import Array
 from idbench.identify.servo.closed_loop import ServoLoop
 from idbench.identify.servo.fit import ServoFit
-from idbench.identify.servo.parameters import FURTHER, limits_of, parameters_of, simpler
+from idbench.identify.servo.parameters import FURTHER, parameters_of
 from idbench.identify.servo.run import ServoRun
 from idbench.identify.servo.stages import Stages
 from idbench.identify.telling import one_thread
@@ -95,8 +95,7 @@ def _covariance(j: int, joints: Mapping[int, OffsetJoint], per_error: Array, own
 
 
 def _moved(fit: ServoFit, by: Array, covariance: Array) -> ServoFit:
-    low, high = limits_of(fit.free)
-    moved = np.clip(np.array([fit.p[name] for name in fit.free]) + by, low, high)
+    moved = np.clip(np.array([fit.p[name] for name in fit.free]) + by, *fit.loop.limits(fit.free))
     p = {**fit.p, **dict(zip(fit.free, moved.tolist(), strict=True))}
     return replace(fit, found=replace(fit.found, p=p), of_all=covariance)
 
@@ -131,11 +130,7 @@ def identify_servo(
         If a name is unknown.
     """
     parameters_of(friction, (*more, *(held or {})))
-    stages = Stages.begun(runs, more, held or {})
-    p = stages.start
-    for law in simpler(friction):
-        p = stages.go(law, (), p)
-    return stages.fit(friction, more, stages.go(friction, more, p))
+    return Stages.start(runs, more, held or {}).fit(friction, more)
 
 
 def with_friction(fit: ServoFit, friction: str) -> ServoFit:
@@ -145,7 +140,7 @@ def with_friction(fit: ServoFit, friction: str) -> ServoFit:
     per_load = sum(fit.p.get(name, 0.0) for name in ("Fl", "Fle", "Fgd"))
     p = {name: x for name, x in fit.p.items() if name in kept} | {"Fs": fit.p["Fs"] + per_load * float(np.mean(loads))}
     held = {name: x for name, x in p.items() if name not in fit.free}
-    return Stages(fit.loop.runs, held, p, cut=False).last(friction, tuple(name for name in fit.free if name in p), p)
+    return Stages(fit.loop.runs, held, p, cut=False).fit_fine(friction, tuple(name for name in fit.free if name in p), p)
 
 
 def identify_again(fit: ServoFit, runs: Sequence[ServoRun]) -> ServoFit:
@@ -157,4 +152,4 @@ def identify_again(fit: ServoFit, runs: Sequence[ServoRun]) -> ServoFit:
         As for `identify_servo`.
     """
     held = {name: x for name, x in fit.p.items() if name not in fit.free}
-    return Stages(runs, held, fit.p).last(fit.friction, fit.free, fit.p, fit.contrasts)
+    return Stages(runs, held, fit.p).fit_fine(fit.friction, fit.free, fit.p, fit.contrasts)

@@ -67,12 +67,12 @@ def mistake_of(fit: ServoFit) -> ServoMistake | None:
     tried = [name for name in MISTAKES if name not in fit.free and not fit.p.get(name) and (name != "Fo" or fit.excitation.off)]
     known = {name: x for name, x in fit.p.items() if name not in fit.free and name not in tried}
     stages = Stages(fit.loop.runs, known, fit.p, cut=False)
-    glances = stages.beside(fit.free, fit.p, tried, GLANCES)
+    glances = stages.fit_with_extra(fit.free, fit.p, tried, GLANCES)
     likely = sorted(tried, key=lambda name: glances[name].cost)[:LIKELY]
-    found = stages.beside(fit.free, fit.p, likely, ROUNDS)
+    found = stages.fit_with_extra(fit.free, fit.p, likely, ROUNDS)
     order = sorted(likely, key=lambda name: found[name].cost)
     names = tuple(name for name in SERVO_PARAMETERS if name in {*fit.free, order[0]})
-    other = stages.last(fit.friction, names, found[order[0]].p, fit.contrasts)
+    other = stages.fit_fine(fit.friction, names, found[order[0]].p, fit.contrasts)
     c, parts = 3 * fit.scale, stretches(fit.found, fit.loop, CLUSTERS * len(names))
     before, after = (left_out(x.found, x.loop, c, parts).costs for x in (fit, other))
     errors = float(np.sqrt(before.mean())), float(np.sqrt(after.mean()))

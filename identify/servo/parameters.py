@@ -5,7 +5,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from idbench.identify.arrays import Array
 from idbench.identify.errors import SettingError
 
 SERVO_FRICTIONS: dict[str, tuple[str, ...]] = {
@@ -23,19 +22,6 @@ other when the motor drives (Fgd) than when it is driven (Fgb)."""
 SIMPLER = {"stribeck": "coulomb", "load": "coulomb", "load-stribeck": "load", "directional": "load", "gear": "stribeck"}
 SIMPLER |= {"quadratic": "directional"}
 """The law of which each is a further one."""
-
-
-def simpler(law: str) -> list[str]:
-    """Return the laws that a law extends, the simplest first.
-
-    Examples
-    --------
-    >>> from idbench.identify.servo.parameters import simpler
-    >>> simpler("load-stribeck")
-    ['coulomb', 'load']
-    """
-    inner = SIMPLER.get(law)
-    return [] if inner is None else [*simpler(inner), inner]
 
 
 def start_parameters(law: str, p: Mapping[str, float], speed: float) -> dict[str, float]:
@@ -121,12 +107,7 @@ def parameters_of(friction: str, more: Sequence[str] = ()) -> tuple[str, ...]:
     return tuple(name for name in SERVO_PARAMETERS if name in (*known, *more))
 
 
-def step_of(name: str, value: float, scales: dict[str, float]) -> float:
+def step_of(name: str, value: float, scales: Mapping[str, float]) -> float:
     """Step of finite differences of a parameter."""
     parameter = SERVO_PARAMETERS[name]
     return parameter.relative * abs(value) if parameter.relative else parameter.share * scales[parameter.of]
-
-
-def limits_of(names: Sequence[str]) -> Array:
-    """Return the smallest and the largest values of parameters, shape (2, p)."""
-    return np.array([[SERVO_PARAMETERS[name].low, SERVO_PARAMETERS[name].high] for name in names]).reshape(-1, 2).T

@@ -58,7 +58,7 @@ def _with(fit: ServoFit, shared: Mapping[str, float], places: list[int], S: Arra
     free = tuple(fit.free[k] for k in others)
     p = {**fit.p, **shared}
     held = {name: x for name, x in p.items() if name not in free}
-    again = Stages(fit.loop.runs, held, p, cut=False).last(fit.friction, free, p, fit.contrasts)
+    again = Stages(fit.loop.runs, held, p, cut=False).fit_fine(fit.friction, free, p, fit.contrasts)
     follow = H[np.ix_(others, places)] @ np.linalg.pinv(
         _part(H, places), hermitian=True
     )  # how parameters of the joint follow its motor's

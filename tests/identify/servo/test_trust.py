@@ -80,6 +80,13 @@ def test_the_law_that_the_log_needs_is_chosen(law, expected):
 
 
 @pytest.mark.thorough
+def test_a_law_that_is_compared_is_fitted_as_if_it_were_asked_for(run):
+    """With a further parameter each law begins at the simpler one, whoever asks."""
+    choice = choose_friction([run], ("lead",))
+    assert choice.fits["load"].p == identify_servo([run], "load", ("lead",)).p
+
+
+@pytest.mark.thorough
 def test_a_fit_says_where_it_lacks(fit):
     """A brake that the model does not have, while torque is off."""
     braked = simulated(0, Fo=0.1)
@@ -181,7 +188,7 @@ def test_where_no_parameter_has_an_effect_no_other_valley_is_tried(fit):
     search = ServoSearch(fit.loop, fit.free, fit.excitation.scales, fit.scale)
     nothing = replace(fit.found.beginnings, K=np.zeros_like(fit.found.beginnings.K))
     still = replace(fit.found, sensitivity=np.zeros_like(fit.found.sensitivity), beginnings=nothing)
-    assert search.away(still) == [fit.p]
+    assert search.axis_points(still) == [fit.p]
 
 
 WRONG = {
