@@ -19,9 +19,7 @@ from idbench.identify.files.servo_file import ServoFile
 from idbench.identify.files.servo_log import ServoColumns
 from idbench.identify.servo import Servo, ServoFit, ServoRun, identify_servo
 from idbench.identify.servo.choice import choose_friction, residuals_by_state
-from idbench.identify.servo.fit import TORQUES
 from idbench.identify.servo.law import EXACT, KINDS
-from idbench.identify.servo.mistakes import MISTAKES, ServoMistake
 from idbench.identify.servo.parameters import SERVO_PARAMETERS
 from idbench.identify.servo.run import without_spikes
 from idbench.sim.drives import ServoDrive
@@ -188,22 +186,27 @@ class Servos:
 
 def summary_of(fit: ServoFit) -> dict[str, Any]:
     """Summary of a fit."""
-    sigma, bound = fit.standard_errors, fit.bound
-    return {
-        name: {"value": x, "sigma": sigma.get(name), "bound": bound.get(name), "unit": unit_of(fit.servo, name)}
-        | ({"factor": list(fit.factor)} if name in TORQUES and not fit.scaled and name not in fit.known else {})
-        for name, x in fit.p.items()
-    } | gains_of(fit)
+    return {name: _entry(fit, name) for name in fit.p} | gains_of(fit)
+
+
+def _entry(fit: ServoFit, name: str) -> dict[str, Any]:
+    """Value of a parameter with its errors; the factor that it is known up to; nothing of an offset without a scale."""
+    if name == "offset" and name in fit.unscaled:
+        return {"value": None, "sigma": None, "bound": None, "unit": unit_of(fit.servo, name)}
+    sigma, bound = fit.standard_errors.get(name), fit.bound.get(name)
+    entry = {"value": fit.p[name], "sigma": sigma, "bound": bound, "unit": unit_of(fit.servo, name)}
+    return entry | ({"factor": list(fit.factor)} if name in fit.unscaled else {})
 
 
 def gains_of(fit: ServoFit) -> dict[str, Any]:
-    """Return the gains of a loop that commands torques, kp and kd at the joint, with the standard error of their factor a."""
-    servo, sigma = fit.servo, fit.standard_errors.get("a")
+    """Gains of a loop that commands torques, kp and kd at the joint, with the standard error of their factor a."""
+    servo = fit.servo
     if servo.kind == Servo.kind:
         return {}
+    a = _entry(fit, "a")
     stated = {"kp": (servo.slope, "N m/rad"), "kd": (servo.kd + servo.slope * fit.p.get("lead", 0.0), "N m s/rad")}
     return {
-        name: {"value": fit.p["a"] * x, "sigma": None if sigma is None else abs(x) * sigma, "bound": None, "unit": unit}
+        name: a | {"value": a["value"] * x, "sigma": a["sigma"] and abs(x) * a["sigma"], "bound": None, "unit": unit}
         for name, (x, unit) in stated.items()
     }
 
@@ -211,21 +214,6 @@ def gains_of(fit: ServoFit) -> dict[str, Any]:
 def unit_of(servo: Servo, name: str) -> str:
     """Return the unit of a parameter; that of a is what its loop commands."""
     return KINDS[servo.kind].unit if name == "a" else SERVO_PARAMETERS[name].unit
-
-
-def mistake_summary(joint: str, mistake: ServoMistake) -> dict[str, Any]:
-    """Summary of a joint's mistake."""
-    return {
-        "cause": MISTAKES[mistake.letter],
-        "joint": joint,
-        "size": mistake.size,
-        "sigma": mistake.sigma,
-        "unit": SERVO_PARAMETERS[mistake.letter].unit,
-        "p": mistake.p,
-        "alternatives": [[MISTAKES[name], joint] for name in mistake.alternatives],
-        "remedy": f"--find {mistake.letter}",
-        "held_out": list(mistake.errors),
-    }
 
 
 def lacks_summary(fit: ServoFit) -> dict[str, Any]:

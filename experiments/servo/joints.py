@@ -247,7 +247,7 @@ class Joints:
             {j: m._replace(t=t, q=np.interp(t, m.t, m.q)) for j, m in each.items()}
             for each, t in zip(self._moving(before, self.runs_with(before)), times, strict=True)
         ]
-        assumed = {k: offset_of(fit) for k, fit in before.items() if k in fits and fit.scaled}
+        assumed = {k: fit.offset for k, fit in before.items() if k in fits and fit.scaled}
         now = self._loaded(moving)
         for k, offset in assumed.items():
             runs = self._loaded([{**each, k: each[k]._replace(offset=offset + APART)} for each in moving])
@@ -266,7 +266,7 @@ class Joints:
         """Simulated motion of joints with these loads, in each log."""
         return [
             {
-                j: Moving(*fit.fine(runs[j][k]), offset_of(fit), fit.p["Ia"], fit.taken_late, fit.servo.steps.early)
+                j: Moving(*fit.fine(runs[j][k]), fit.offset, fit.p["Ia"], fit.taken_late, fit.servo.steps.early)
                 for j, fit in fits.items()
             }
             for k in range(len(self.logs))
@@ -295,11 +295,6 @@ class Joints:
 def _apart(one: Sequence[Mapping[int, Moving]], other: Sequence[Mapping[int, Moving]]) -> float:
     """Largest mean difference of motions over joints and logs [rad]."""
     return max(float(np.abs(a[j].q - b[j].q).mean()) for a, b in zip(one, other, strict=True) for j in a)
-
-
-def offset_of(fit: ServoFit) -> float:
-    """Return the offset that others assume of a joint [rad]: it follows from gravity, and is wrong without a scale."""
-    return fit.p["offset"] if fit.scaled else 0.0
 
 
 def _attempt(identify: Callable[[], Identified]) -> tuple[Identified | str, ServoFit | None]:

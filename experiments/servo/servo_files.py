@@ -70,9 +70,11 @@ def inexpressible(fits: Mapping[str, ServoFit]) -> list[str]:
     found = cannot_express(x for fit in fits.values() for x in fit.free)
     if any("backlash" in fit.free for fit in fits.values()):
         found.append("backlash is written as a second joint; the loop of the dcmotor sees the rotor, before the play")
-    offsets = {joint: fit.p["offset"] for joint, fit in fits.items()}
-    words = ", ".join(f"{joint} {x:+.4g}" for joint, x in offsets.items())
-    return [*found, f"the file's angles are the log's plus an offset [rad]: {words}; add it to commands"]
+    words = ", ".join(f"{joint} {fit.offset:+.4g}" for joint, fit in fits.items())
+    found.append(f"the file's angles are the log's plus an offset [rad]: {words}; add it to commands")
+    if unknown := [joint for joint, fit in fits.items() if "offset" in fit.unscaled]:
+        found.append(f"{', '.join(unknown)}: torques have no scale, so the offset is not known, and taken as 0")
+    return found
 
 
 def without_servo(joints: Sequence[str], fits: Mapping[str, ServoFit]) -> list[str]:
@@ -108,7 +110,7 @@ def in_mujoco(
     columns = servos.logs[path]
     places = [servos.place(joint) for joint in fits]
     offset = np.zeros(servos.links.n)
-    offset[places] = [fit.p["offset"] for fit in fits.values()]
+    offset[places] = [fit.offset for fit in fits.values()]
     on = None if columns.on is None else columns.on[:, places] > 0.5
     sent = Commands(columns.t, (columns.command + offset)[:, places], places, on)
     text = mjcf_of(servos, fits, folder, position, path.name)

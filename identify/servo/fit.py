@@ -82,6 +82,18 @@ class ServoFit:
         """Parameters that were not searched for."""
         return frozenset(self.p) - set(self.free) - ({"a"} if not self.excitation.loaded else set())
 
+    @cached_property
+    def unscaled(self) -> frozenset[str]:
+        """Parameters that lack the scale of torques: torques, known up to a common factor, and an offset, found by gravity."""
+        if self.scaled:
+            return frozenset()
+        return frozenset({*TORQUES} & {*self.p} - self.known | {"offset"} & {*self.free})
+
+    @property
+    def offset(self) -> float:
+        """Angle of the file minus angle of the log [rad], 0 where torques have no scale to find it by."""
+        return 0.0 if "offset" in self.unscaled else self.p["offset"]
+
     @property
     def explained(self) -> bool:
         """Whether commands explain the motion."""

@@ -113,3 +113,16 @@ def test_offsets_that_agree_stay_within_the_range_of_the_joint():
     for way in (-5.0, 5.0):
         found = together(pair, {1: other.p["offset"] - way})
         assert found[0].p["offset"] == pytest.approx(0.1 * np.sign(way))
+
+
+def test_an_offset_follows_from_gravity_and_is_none_where_torques_have_no_scale():
+    """Unless it is held."""
+    one = fit_of(covariance())
+    found = replace(one.found, residual=RNG.normal(size=(1, 100)))
+    loop, shown = SimpleNamespace(runs=[None], samples=100), SimpleNamespace(loaded=True)
+    scaled, fit = (replace(one, found=found, loop=loop, excitation=shown, contrasts=(x, x)) for x in (np.inf, 1.0))
+    assert scaled.offset == one.p["offset"] != 0
+    assert scaled.unscaled == set()
+    assert fit.offset == 0
+    assert fit.unscaled == {"a", "offset"}
+    assert replace(fit, free=("a", "lead")).offset == one.p["offset"]

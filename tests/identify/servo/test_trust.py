@@ -8,7 +8,7 @@ import pytest
 from idbench.identify.servo import SERVO_FRICTIONS, JointLoad, Servo, ServoRun, identify_again, identify_servo
 from idbench.identify.servo.choice import choose_friction, residuals_by_state
 from idbench.identify.servo.closed_loop import ServoLoop, count_of
-from idbench.identify.servo.mistakes import mistake_of
+from idbench.identify.servo.mistakes import MISTAKES, mistake_of
 from idbench.identify.servo.search import ServoSearch
 
 SERVO = Servo(0.166, 16.0, supply=12.0, limit=0.97, counts=4096)
@@ -205,9 +205,9 @@ def test_a_mistake_is_named_with_its_size(letter):
     spoil, size = WRONG[letter]
     found = mistake_of(identify_servo([spoil(simulated(0))], "coulomb"))
     assert found is not None
-    assert found.letter == letter
-    assert found.size == pytest.approx(size, rel=0.05)
-    assert found.errors[1] < 0.2 * found.errors[0]
+    assert found.cause == MISTAKES[letter]
+    assert found.size[0] == pytest.approx(size, rel=0.05)
+    assert found.held_out[1] < 0.2 * found.held_out[0]
 
 
 @pytest.mark.thorough
