@@ -18,14 +18,14 @@ BENCH = "pendulum"  # Robot to whose joint a servo is written where none is name
 
 @cache
 def devices() -> dict[str, dict[str, Any]]:
-    """Return the devices that ship, by their names."""
+    """Devices that ship, by their names."""
     folder = files("idbench.experiments.servo").joinpath("devices")
     found = [json.loads(path.read_text(encoding="utf-8")) for path in folder.iterdir() if path.name.endswith(".json")]
     return {device["name"]: device for device in sorted(found, key=lambda device: str(device["name"]))}
 
 
 def device_of(name: str) -> dict[str, Any]:
-    """Return a device; raise ExperimentError if none has this name."""
+    """A device; raise ExperimentError if none has this name."""
     every = devices()
     if name not in every:
         raise ExperimentError(f"there is no device {name!r}{did_you_mean(name, every)}; there are {', '.join(every)}")
@@ -33,14 +33,14 @@ def device_of(name: str) -> dict[str, Any]:
 
 
 def servo_toml_of(device: Mapping[str, Any]) -> str:
-    """Return a servo.toml of a device, and the words that hold its parameters in a fit."""
+    """A servo.toml of a device, and the words that hold its parameters in a fit."""
     known = "\n".join(f"{key} = {json.dumps(x)}" for key, x in device["known"].items())
     held = " ".join(f"{letter}={of['value']:.4g}" for letter, of in device["parameters"].items() if letter in ("a", "b"))
     return f"# {device['name']}: {device['source']}\n# a joint without a known load: --hold {held}\n{known}\nkp = 16  # yours\n"
 
 
 def mjcf_of_device(device: Mapping[str, Any], robot: str, joints: Sequence[int], kp: float, folder: Path) -> str:
-    """Return a robot's MJCF with the device at joints, by their numbers, and a gain of its firmware."""
+    """A robot's MJCF with the device at joints, by their numbers, and a gain of its firmware."""
     p = {letter: of["value"] for letter, of in device["parameters"].items()}
     values = values_of(p, ServoFile({**device["known"], "kp": kp}, {}, {}).servo("", ""))
     return with_servos(robot, dict.fromkeys(joints, values), folder)

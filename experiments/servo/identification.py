@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from functools import cached_property
 from pathlib import Path
@@ -32,7 +32,7 @@ from idbench.sim.settings import per_joint
 
 
 def known_servos(drive: ServoDrive, n: int) -> list[Servo]:
-    """Return gain, supply, largest duty and counts of the servos of n joints."""
+    """Gain, supply, largest duty and counts of the servos of n joints."""
     kp = per_joint(drive.kp, n, "drive.kp").tolist()
     return [Servo(drive.gain, x, drive.supply, drive.duty_limit, drive.counts or EXACT) for x in kp]
 
@@ -76,7 +76,7 @@ class Servos:
         return links(self.robot, self.mounting)
 
     def links_of(self, path: Path) -> Robot:
-        """Return the robot without its drives, with what it carried in a log.
+        """Robot without its drives, with what it carried in a log.
 
         Raises
         ------
@@ -131,7 +131,7 @@ class Servos:
         yield from ((names[j], result) for j, result in self.joints.identified(identify, self.motors(ties)))
 
     def motors(self, ties: Sequence[str]) -> list[list[int]]:
-        """Return the joints of each motor, by patterns of their names, several with commas."""
+        """Joints of each motor, by patterns of their names, several with commas."""
         names, found = self.links.joints, list[list[int]]()
         for tie in ties:
             own = [[j for j, name in enumerate(names) if fnmatchcase(name, pattern)] for pattern in tie.split(",")]
@@ -144,17 +144,17 @@ class Servos:
         return found
 
     def runs_with(self, fits: Mapping[str, ServoFit]) -> dict[str, list[ServoRun]]:
-        """Return runs of the joints that have a fit, while the others move as their fits say."""
+        """Runs of the joints that have a fit, while the others move as their fits say."""
         runs = self.joints.runs_with({self.place(joint): fit for joint, fit in fits.items()})
         return {joint: runs[self.place(joint)] for joint in fits}
 
     def simulated(self, fits: Mapping[str, ServoFit], path: Path) -> dict[str, Array]:
-        """Return the positions of joints from the commands of a log alone [rad], as the log has them, by joint."""
+        """Positions of joints from the commands of a log alone [rad], as the log has them, by joint."""
         k, runs = list(self.logs).index(path), self.runs_with(fits)
         return {joint: fit.simulate([runs[joint][k]])[0] for joint, fit in fits.items()}
 
     def errors(self, fits: Mapping[str, ServoFit]) -> dict[str, Array]:
-        """Return the mean absolute error [rad] of each log, simulated from its commands alone, by joint."""
+        """Mean absolute error [rad] of each log, simulated from its commands alone, by joint."""
         runs = self.runs_with(fits)
         return {joint: fit.errors(runs[joint]) for joint, fit in fits.items()}
 
@@ -176,12 +176,8 @@ class Servos:
         return dict(zip(self.links.joints, map(float, np.sqrt(squares)), strict=True))
 
     def place(self, joint: str) -> int:
-        """Return the number of a joint."""
+        """Number of a joint."""
         return self.links.joints.index(joint)
-
-    def of_logs(self, logs: dict[Path, ServoColumns]) -> "Servos":
-        """Return the same servos with other logs."""
-        return replace(self, logs=logs)
 
 
 def summary_of(fit: ServoFit) -> dict[str, Any]:
@@ -212,7 +208,7 @@ def gains_of(fit: ServoFit) -> dict[str, Any]:
 
 
 def unit_of(servo: Servo, name: str) -> str:
-    """Return the unit of a parameter; that of a is what its loop commands."""
+    """Unit of a parameter; that of a is what its loop commands."""
     return KINDS[servo.kind].unit if name == "a" else SERVO_PARAMETERS[name].unit
 
 

@@ -112,7 +112,7 @@ Heard = Callable[[str, Identified | str, ServosFit], None]
 
 
 def servos_identified(asked: ServoRequest, heard: Heard | None = None) -> ServosFit:
-    """Return the servos of a robot, identified joint by joint.
+    """Servos of a robot, identified joint by joint.
 
     Raises
     ------
@@ -148,7 +148,7 @@ def _tested(fit: ServoFit) -> Suspect | None:
 
 
 def servos_of(asked: ServoRequest) -> tuple[Servos, Servos | None]:
-    """Return the servos with the logs of the fit, and with those that it does not see."""
+    """Servos with the logs of the fit, and with those that it does not see."""
     if asked.robot is None:
         raise ExperimentError("--robot is missing; see idbench servo --help")
     if not asked.log:
@@ -166,7 +166,7 @@ def servos_of(asked: ServoRequest) -> tuple[Servos, Servos | None]:
     read = {path: _read(path, asked, robot.joints, loops) for path in (*logs, *held)}
     notes += [said for _, said in read.values() if said]
     servos = Servos(absolute(asked.robot), mounting, known, {}, tuple(notes))
-    made, others = (servos.of_logs({path: read[path][0] for path in of}) for of in (logs, held))
+    made, others = (replace(servos, logs={path: read[path][0] for path in of}) for of in (logs, held))
     return made, others if held else None
 
 
@@ -194,7 +194,7 @@ def _said(loops: Mapping[str, PositionLoop], known: ServoFile) -> Iterator[str]:
 
 
 def held_of(asked: ServoRequest, joints: Sequence[str]) -> dict[str, dict[str, float]]:
-    """Return the parameters that are known, by joint: what names a joint goes before what names none."""
+    """Parameters that are known, by joint: what names a joint goes before what names none."""
     try:
         values = {name: float(value) for name, value in _stated("--hold", asked.hold).items()}
     except ValueError:
@@ -218,7 +218,7 @@ def held_of(asked: ServoRequest, joints: Sequence[str]) -> dict[str, dict[str, f
 def _read(
     path: Path, asked: ServoRequest, joints: Sequence[str], loops: Mapping[str, PositionLoop]
 ) -> tuple[ServoColumns, str]:
-    """Return a log in the order of the joints, commands as angles, and what was assumed of it."""
+    """A log in the order of the joints, commands as angles, and what was assumed of it."""
     try:
         rows = {name: float(value) for name, value in _stated("--rows", asked.rows).items()}
     except ValueError:

@@ -23,7 +23,7 @@ NONE = {"rate": float("inf"), "vs": 1.0}  # What parameters are that a servo doe
 
 
 def servo_function(robot: str, fits: Mapping[str, tuple[Servo, ServoFit]], logs: Sequence[str]) -> str:
-    """Return the file: what is known of each joint's servo, and what was found."""
+    """Python file of what is known of each joint's servo, and what was found."""
     text = files("idbench.experiments.exports").joinpath("servo.py.txt").read_text(encoding="utf-8")
     every = {joint: _parameters(servo, fit) for joint, (servo, fit) in fits.items()}
     table = pformat(every, width=110, sort_dicts=False).replace("inf", 'float("inf")')
@@ -40,7 +40,7 @@ def servo_function(robot: str, fits: Mapping[str, tuple[Servo, ServoFit]], logs:
 
 
 def _friction_lines() -> str:
-    """Return the lines of the compiled friction as plain Python, the parameters `p` a table."""
+    """Lines of the compiled friction as plain Python, the parameters `p` a table."""
     from idbench.identify.servo.servo_step import friction
 
     lines: Any = ast.parse(dedent(inspect.getsource(friction.py_func))).body[0]
@@ -84,7 +84,7 @@ def without_servo(joints: Sequence[str], fits: Mapping[str, ServoFit]) -> list[s
 
 
 def values_of(parameters: Mapping[str, float], servo: Servo) -> ServoValues:
-    """Return a servo as MuJoCo has it: its parameters by their letters, and what is stated of it."""
+    """A servo as MuJoCo has it: its parameters by their letters, and what is stated of it."""
     p = {**dict.fromkeys(("Fv", "lead", "lag", "gain_error", "backlash"), 0.0), "rate": np.inf, **parameters}
     slope = servo.slope * (1 + p["gain_error"])
     delay = p["delay"] - servo.steps.early  # of a simulation, which acts early as well
@@ -93,12 +93,12 @@ def values_of(parameters: Mapping[str, float], servo: Servo) -> ServoValues:
 
 
 def for_mujoco(fits: Mapping[str, ServoFit]) -> dict[str, ServoFit]:
-    """Return fits with the friction that MuJoCo has, which does not grow with the load: fitted again where it did."""
+    """Fits with the friction that MuJoCo has, which does not grow with the load: fitted again where it did."""
     return {joint: with_friction(fit, "coulomb") if SERVO_FRICTIONS[fit.friction] else fit for joint, fit in fits.items()}
 
 
 def mjcf_of(servos: Servos, fits: Mapping[str, ServoFit], folder: Path, position: bool = False, log: str = "") -> str:
-    """Return the robot's MJCF with the servos that were found; of a log its robot, and what is stated of its servos."""
+    """Robot's MJCF with the servos that were found; of a log its robot, and what is stated of its servos."""
     place = {servos.place(joint): values_of(fit.p, servos.known.servo(joint, log)) for joint, fit in fits.items()}
     return with_servos(servos.known.robot(log) or servos.robot, place, folder, servos.mounting, position)
 
@@ -106,7 +106,7 @@ def mjcf_of(servos: Servos, fits: Mapping[str, ServoFit], folder: Path, position
 def in_mujoco(
     servos: Servos, fits: Mapping[str, ServoFit], folder: Path, path: Path, position: bool = False
 ) -> dict[str, float]:
-    """Return the mean absolute error [rad] of each joint, a log's commands given to the file in plain MuJoCo."""
+    """Mean absolute error [rad] of each joint, a log's commands given to the file in plain MuJoCo."""
     columns = servos.logs[path]
     places = [servos.place(joint) for joint in fits]
     offset = np.zeros(servos.links.n)

@@ -61,7 +61,7 @@ def servo_table(fits: Mapping[str, ServoFit]) -> Listing:
 
 
 def value_of(fit: ServoFit, name: str) -> str:
-    """Return a parameter with its standard error, or the factor that it is known up to."""
+    """A parameter with its standard error, or the factor that it is known up to."""
     if name not in fit.p:
         return ""
     sigma = fit.standard_errors.get(name)

@@ -78,7 +78,7 @@ class ServoLoop:
         return limits
 
     def simulate(self, p: Mapping[str, npt.ArrayLike], ahead: npt.ArrayLike = 0.0) -> Array:
-        """Return positions at the samples of the log [rad], shape (lane, run, sample), for a value of each parameter a lane.
+        """Positions at the samples of the log [rad], shape (lane, run, sample), for a value of each parameter a lane.
 
         `ahead`, shape (lane, run, 3) or less, is how runs begin beside what was measured (see `Begin`) [rad].
         """
@@ -108,7 +108,7 @@ class ServoLoop:
         out[:, len(before) :] = out[:, len(before) - 1 : len(before)]
 
     def _place(self, run: ServoRun) -> tuple[npt.NDArray[np.int64], Array]:
-        """Return the step before each sample, and by how much of a step the sample is later."""
+        """Step before each sample, and by how much of a step the sample is later."""
         x = (run.t - run.t[0]) / self.h
         before = x.astype(np.int64)
         return before, x - before
@@ -126,7 +126,7 @@ class ServoLoop:
 
 
 def count_of(runs: Sequence[ServoRun]) -> float:
-    """Return the angle of a count [rad] if nearly all positions are whole counts, else 0, as where they were filtered.
+    """Angle of a count [rad] if nearly all positions are whole counts, else 0, as where they were filtered.
 
     A joint stops where the firmware sees the next count. There, errors of rounding are not noise: all have one direction.
     """
@@ -137,7 +137,7 @@ def count_of(runs: Sequence[ServoRun]) -> float:
 
 
 def _centred(x: Array) -> Array:
-    """Return the means of held values over the steps about their instants, in which forces act."""
+    """Means of held values over the steps about their instants, in which forces act."""
     return np.concatenate([x[:1], (x[1:] + x[:-1]) / 2])
 
 

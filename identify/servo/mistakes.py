@@ -8,7 +8,7 @@ from idbench.identify.arrays import TINY
 from idbench.identify.judge.suspect import Suspect
 from idbench.identify.servo.choice import LEVEL, p_value, residuals_by_state
 from idbench.identify.servo.fit import CLUSTERS, ServoFit
-from idbench.identify.servo.left_out import left_out, stretches
+from idbench.identify.servo.left_out import cross_validate, stretches
 from idbench.identify.servo.parameters import SERVO_PARAMETERS
 from idbench.identify.servo.stages import Stages
 
@@ -60,7 +60,7 @@ def mistake_of(fit: ServoFit) -> Suspect | None:
     names = tuple(name for name in SERVO_PARAMETERS if name in {*fit.free, best})
     other = stages.fit_fine(fit.friction, names, found[best].p, fit.contrasts)
     c, parts = 3 * fit.scale, stretches(fit.found, fit.loop, CLUSTERS * len(names))
-    before, after = (left_out(x.found, x.loop, c, parts).costs for x in (fit, other))
+    before, after = (cross_validate(x.found, x.loop, c, parts).costs for x in (fit, other))
     errors = float(np.sqrt(before.mean())), float(np.sqrt(after.mean()))
     p = p_value(before, after, len(tried))
     if errors[1] > (1 - GAINED) * errors[0] or p >= LEVEL or other.scale > REMAINING * fit.excitation.range:

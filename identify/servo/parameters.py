@@ -91,7 +91,7 @@ FURTHER = ("lag", "lead", "dead_band", "backlash", "gain_error", "scale_error", 
 
 
 def parameters_of(friction: str, more: Sequence[str] = ()) -> tuple[str, ...]:
-    """Return the parameters that may be found of a servo with a law of friction, in their order.
+    """Parameters that may be found of a servo with a law of friction, in their order.
 
     Raises
     ------

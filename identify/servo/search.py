@@ -77,7 +77,7 @@ class ServoSearch:
         return float((self.c / 3 / MEDIAN) ** 2 / (self._count**2 / 12))
 
     def cost(self, q: Array, ahead: Array | float = 0.0) -> Array:
-        """Return the objective of simulated positions, shape (lane,), of runs that begin ahead, shape (lane, run, 3)."""
+        """Objective of simulated positions, shape (lane,), of runs that begin ahead, shape (lane, run, 3)."""
         r = np.abs(self.loop.q - q) * self.loop.kept / self.c
         total = 2 * self.c**2 * (r - np.log1p(r)).sum(axis=(1, 2)) + self._certainty * (
             np.square(ahead).sum(axis=(-2, -1)) if np.ndim(ahead) else 0.0
@@ -85,7 +85,7 @@ class ServoSearch:
         return np.nan_to_num(total, nan=np.inf, posinf=np.inf)
 
     def best(self, start: Mapping[str, float], rounds: int) -> Found:
-        """Return the best parameters that are found from a start.
+        """Best parameters that are found from a start.
 
         Levenberg and Marquardt, x(k+1) = x(k) - (J' J + mu D)^-1 J' r, initial positions eliminated (Schur complement);
         several mu, and samples about the step, are simulated at once, and the best of all is x(k+1).
@@ -122,7 +122,7 @@ class ServoSearch:
         return self._found({**start, **dict(zip(self.free, x.tolist(), strict=True))}, ahead, min(width, 0.5))
 
     def at(self, found: Found) -> Found:
-        """Return residuals and sensitivities where another search ended."""
+        """Residuals and sensitivities where another search ended."""
         return self._found(found.p, found.ahead, 0.5)
 
     def _found(self, p: dict[str, float], ahead: Array, width: float) -> Found:
@@ -148,7 +148,7 @@ class ServoSearch:
         return [{**found.p, **dict(zip(self.free, one.tolist(), strict=True))} for one in tried]
 
     def _within(self, x: Array, steps: Array) -> Array:
-        """Return x with steps, which change no parameter whose size is known by more than a third."""
+        """X with steps, which change no parameter whose size is known by more than a third."""
         relative = np.array([SERVO_PARAMETERS[name].relative > 0 for name in self.free], dtype=bool)
         most = np.where(relative, np.abs(x) / 3, np.inf)
         return np.clip(x + np.clip(steps, -most, most), *self.loop.limits(self.free))
@@ -160,7 +160,7 @@ class ServoSearch:
     def _differences(
         self, start: Mapping[str, float], x: Array, ahead: Array, width: float
     ) -> tuple[Array, Array, Array, Array, Nuisances]:
-        """Return points about x, their costs, sensitivity and residual at x, and other beginnings as unknowns."""
+        """Points about x, their costs, sensitivity and residual at x, and other beginnings as unknowns."""
         h = width * np.array([step_of(name, value, self.scales) for name, value in zip(self.free, x, strict=True)])
         upper = x + np.diag(h)
         lower = np.maximum(x - np.diag(h), self.loop.limits(self.free)[0])

@@ -247,13 +247,13 @@ class Stages:
 
 
 def searched_runs(runs: Sequence[ServoRun], delay: float) -> list[ServoRun]:
-    """Return runs, or their pieces, that a search looks at, commands being as late as its start says [s]."""
+    """Runs, or their pieces, that a search looks at, commands being as late as its start says [s]."""
     whole = _evenly(runs)
     return whole if len(whole) > FEW else [piece for run in whole for piece in pieces(run, 1.5 * max(delay, 0.0))]
 
 
 def _first_estimate(runs: Sequence[ServoRun], held: Mapping[str, float], excitation: Excitation) -> dict[str, float]:
-    """Return the start of the rows whose simulation fits best; raise IdentificationError if the command has the other sign."""
+    """Start of the rows whose simulation fits best; raise IdentificationError if the command has the other sign."""
     best, cost = _best_start(runs, held, excitation)
     turned = [replace(run, command=-run.command, forward=None if run.forward is None else -run.forward) for run in runs]
     if cost > MISLED and _best_start(turned, held, excitation)[1] < cost / 2:
@@ -272,7 +272,7 @@ def _first_estimate(runs: Sequence[ServoRun], held: Mapping[str, float], excitat
 
 
 def _best_start(runs: Sequence[ServoRun], held: Mapping[str, float], excitation: Excitation) -> tuple[dict[str, float], float]:
-    """Return the start of the rows that fits best, and its mean residual over the range; nothing if there is none."""
+    """Start of the rows that fits best, and its mean residual over the range; nothing if there is none."""
     starts = ServoRows(runs, held).starts()[:TRIED]
     if not starts:
         return {}, np.inf
@@ -284,7 +284,7 @@ def _best_start(runs: Sequence[ServoRun], held: Mapping[str, float], excitation:
 
 
 def _play(loop: ServoLoop, begin: dict[str, float]) -> float:
-    """Return the backlash of some that fits best: where there is none to begin with, its sensitivity is none."""
+    """Backlash of some that fits best: where there is none to begin with, its sensitivity is none."""
     tried = loop.runs[0].still * PLAYS
     r = np.abs(loop.q - loop.simulate({name: np.full(len(tried), x) for name, x in begin.items()} | {"backlash": tried}))
     return float(tried[int((r * loop.kept).mean(axis=(1, 2)).argmin())])
