@@ -16,10 +16,8 @@ import numpy as np
 from idbench.experiments.servo.identification import Servos
 from idbench.identify.servo import SERVO_FRICTIONS, Servo, ServoFit
 from idbench.identify.servo.identification import with_friction
-from idbench.identify.servo.parameters import SERVO_PARAMETERS
+from idbench.identify.servo.parameters import SERVO_PARAMETERS, ServoLaw
 from idbench.sim.robot.servos import Commands, ServoValues, replay, with_servos
-
-NONE = {"rate": float("inf"), "vs": 1.0}  # What parameters are that a servo does not have; others are 0
 
 
 def servo_function(robot: str, fits: Mapping[str, tuple[Servo, ServoFit]], logs: Sequence[str]) -> str:
@@ -51,7 +49,8 @@ def _friction_lines() -> str:
 def _parameters(servo: Servo, fit: ServoFit) -> dict[str, float]:
     known = {"gain": servo.slope, "kd": servo.kd, "supply": servo.supply, "limit": servo.limit, "counts": servo.counts}
     known |= {"speed_limit": servo.speed_limit}
-    return {**known, **{name: float(fit.p.get(name, NONE.get(name, 0.0))) for name in SERVO_PARAMETERS if name != "backlash"}}
+    law = ServoLaw(**fit.p)._asdict()
+    return {**known, **{name: float(law[name]) for name in SERVO_PARAMETERS if name != "backlash"}}
 
 
 EXPRESSIBLE = ("a", "b", "Ia", "Fs", "Fv", "offset", "lag", "lead", "delay", "rate", "backlash")
@@ -85,11 +84,11 @@ def without_servo(joints: Sequence[str], fits: Mapping[str, ServoFit]) -> list[s
 
 def values_of(parameters: Mapping[str, float], servo: Servo) -> ServoValues:
     """A servo as MuJoCo has it: its parameters by their letters, and what is stated of it."""
-    p = {**dict.fromkeys(("Fv", "lead", "lag", "gain_error", "backlash"), 0.0), "rate": np.inf, **parameters}
-    slope = servo.slope * (1 + p["gain_error"])
-    delay = p["delay"] - servo.steps.early  # of a simulation, which acts early as well
-    drive = p["a"], p["b"], slope, servo.supply, servo.limit, p["Ia"], p["Fv"], p["Fs"], p["rate"], delay, p["backlash"]
-    return ServoValues(*drive, servo.kd + slope * p["lead"], p["lag"], servo.kind == Servo.kind)
+    p = ServoLaw(**{"offset": 0.0, **parameters})
+    slope = servo.slope * (1 + p.gain_error)
+    delay = p.delay - servo.steps.early  # of a simulation, which acts early as well
+    drive = p.a, p.b, slope, servo.supply, servo.limit, p.Ia, p.Fv, p.Fs, p.rate, delay, p.backlash
+    return ServoValues(*drive, servo.kd + slope * p.lead, p.lag, servo.kind == Servo.kind)
 
 
 def for_mujoco(fits: Mapping[str, ServoFit]) -> dict[str, ServoFit]:

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.stats import wilcoxon
 
 from idbench.identify.arrays import Array
-from idbench.identify.servo.fit import ServoFit
+from idbench.identify.servo.fit import CLUSTERS, ServoFit
 from idbench.identify.servo.left_out import cross_validate, stretches
 from idbench.identify.servo.parameters import SERVO_FRICTIONS, parameters_of
 from idbench.identify.servo.run import ServoRun
@@ -52,7 +52,6 @@ def residuals_by_state(fit: ServoFit) -> list[ServoLack]:
 
 
 LEVEL = 0.05  # p value, of all comparisons together, below which a law is better
-PER_PARAMETER = 2  # Parts of the log per parameter of the largest law, each predicted without it
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +91,7 @@ def choose_friction(
     stages = Stages.start(runs, more, held or {})
     fits = {law: stages.fit(law, more) for law in SERVO_FRICTIONS}
     c = 3 * float(np.median([fit.scale for fit in fits.values()]))  # one measure for all
-    clusters = PER_PARAMETER * max(len(fit.free) for fit in fits.values())
+    clusters = CLUSTERS * max(len(fit.free) for fit in fits.values())
     parts = min(stretches(fit.found, fit.loop, clusters) for fit in fits.values())  # the same parts of the log for all laws
     costs = {law: cross_validate(fit.found, fit.loop, c, parts).costs for law, fit in fits.items()}
     first, *others = fits

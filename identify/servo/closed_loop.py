@@ -3,17 +3,14 @@
 import os
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from idbench.identify.arrays import Array
-from idbench.identify.servo.parameters import SERVO_PARAMETERS
+from idbench.identify.servo.parameters import SERVO_PARAMETERS, ServoLaw
 from idbench.identify.servo.run import ServoRun
-
-if TYPE_CHECKING:
-    from idbench.identify.servo.servo_step import ServoLaw
 
 IN_COUNTS = 0.1  # How far from a whole count a position may be written, as a share of it, and still be one
 
@@ -82,8 +79,6 @@ class ServoLoop:
 
         `ahead`, shape (lane, run, 3) or less, is how runs begin beside what was measured (see `Begin`) [rad].
         """
-        from idbench.identify.servo.servo_step import ServoLaw  # its compiler takes longer than many a command
-
         lanes = max(np.size(x) for x in p.values())
         every = {name: np.broadcast_to(np.asarray(x, dtype=np.float64), (lanes,)).tolist() for name, x in p.items()}
         laws = [ServoLaw(**{name: x[lane] for name, x in every.items()}) for lane in range(lanes)]
@@ -93,9 +88,13 @@ class ServoLoop:
             list(pool.map(lambda k: self._simulate_run(k, laws, begins[:, k], out[:, k]), range(len(self.runs))))
         return out
 
-    def _simulate_run(self, k: int, laws: "Sequence[ServoLaw]", ahead: Array, out: Array) -> None:
+    def _simulate_run(self, k: int, laws: Sequence[ServoLaw], ahead: Array, out: Array) -> None:
         """Write the positions of a run into `out`, shape (lane, sample)."""
-        from idbench.identify.servo.servo_step import Firmware, at_samples, motion
+        from idbench.identify.servo.servo_step import (
+            Firmware,
+            at_samples,
+            motion,
+        )  # its compiler takes longer than many a command
 
         (before, share) = self._places[k]
         begin = self._begin[k]

@@ -51,6 +51,38 @@ class ServoParameter(NamedTuple):
     """Largest value."""
 
 
+class ServoLaw(NamedTuple):
+    """Parameters of a servo, by the letters of `SERVO_PARAMETERS`; by default those of other laws do nothing."""
+
+    a: float
+    b: float
+    Ia: float
+    Fs: float
+    Fv: float
+    offset: float
+    delay: float
+    rate: float = np.inf
+    lag: float = 0.0
+    lead: float = 0.0
+    dead_band: float = 0.0
+    gain_error: float = 0.0
+    scale_error: float = 0.0
+    zero: float = 0.0
+    bias: float = 0.0
+    backlash: float = 0.0
+    Mg: float = 0.0
+    Fo: float = 0.0
+    Fst: float = 0.0
+    vs: float = 1.0
+    Fl: float = 0.0
+    Fls: float = 0.0
+    Fle: float = 0.0
+    Flm: float = 0.0
+    Flq: float = 0.0
+    Fgd: float = 0.0
+    Fgb: float = 0.0
+
+
 NEGATIVE = float("-inf")
 
 LATEST = 1.0  # Longest delay of a command [s]: what comes later is no response to it

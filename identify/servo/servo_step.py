@@ -9,40 +9,9 @@ import numpy.typing as npt
 from idbench.identify.arrays import Array
 from idbench.identify.compiled import compiled
 from idbench.identify.servo.law import TimeSteps
+from idbench.identify.servo.parameters import ServoLaw
 
 LIGHT = 1e-9  # Inertia of a link that has none, beside that of its rotor
-
-
-class ServoLaw(NamedTuple):
-    """Parameters of a servo, by the letters of `SERVO_PARAMETERS`, and what makes those of other laws do nothing."""
-
-    a: float
-    b: float
-    Ia: float
-    Fs: float
-    Fv: float
-    offset: float
-    delay: float
-    rate: float = math.inf
-    lag: float = 0.0
-    lead: float = 0.0
-    dead_band: float = 0.0
-    gain_error: float = 0.0
-    scale_error: float = 0.0
-    zero: float = 0.0
-    bias: float = 0.0
-    backlash: float = 0.0
-    Mg: float = 0.0
-    Fo: float = 0.0
-    Fst: float = 0.0
-    vs: float = 1.0
-    Fl: float = 0.0
-    Fls: float = 0.0
-    Fle: float = 0.0
-    Flm: float = 0.0
-    Flq: float = 0.0
-    Fgd: float = 0.0
-    Fgb: float = 0.0
 
 
 class Firmware(NamedTuple):
