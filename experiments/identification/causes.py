@@ -112,6 +112,29 @@ def causes_of(
     return tuple(Cause(each, robot_model, log, gains, turned) for each in suspects)
 
 
+def suspect_summary(suspect: Suspect, joints: Sequence[str], unit: str, remedy: str) -> dict[str, Any]:
+    """Summary of a mistake by names of joints, with what mends it."""
+
+    def named(j: int | None) -> str | None:
+        return None if j is None else joints[j]
+
+    single = len(suspect.size) == 1
+    return {
+        "cause": suspect.cause,
+        "joint": named(suspect.joint),
+        "of": suspect.of,
+        "size": suspect.size[0] if single else list(suspect.size),
+        "sigma": suspect.sigma[0] if single else list(suspect.sigma),
+        "unit": unit,
+        "p": suspect.p,
+        "alternatives": [{"cause": cause, "joint": named(j)} for cause, j in suspect.alternatives],
+        "remedy": remedy,
+        "held_out": list(suspect.held_out),
+        "instant": suspect.instant,
+        "log": None if suspect.log is None else suspect.log + 1,
+    }
+
+
 LENGTHS = frozenset({"tilt", "axis", "eccentric", "cogging", "commutation", "base_motion"})
 """Causes of two sizes across each other, whose length is reported."""
 
@@ -175,22 +198,7 @@ class Cause:
 
     def summary(self) -> dict[str, Any]:
         """Its part of summary.json."""
-        s, joints = self.suspect, self.robot_model.robot.joints
-        single = len(s.size) == 1
-        return {
-            "cause": s.cause,
-            "joint": self.joint,
-            "of": s.of,
-            "size": s.size[0] if single else list(s.size),
-            "sigma": s.sigma[0] if single else list(s.sigma),
-            "unit": self._unit,
-            "p": s.p,
-            "alternatives": [{"cause": c, "joint": None if j is None else joints[j]} for c, j in s.alternatives],
-            "remedy": self.mends,
-            "held_out": list(s.held_out),
-            "instant": s.instant,
-            "log": None if s.log is None else s.log + 1,
-        }
+        return suspect_summary(self.suspect, self.robot_model.robot.joints, self._unit, self.mends)
 
     @property
     def _wording(self) -> Wording:

@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from functools import cached_property
 from pathlib import Path
@@ -19,9 +19,7 @@ from idbench.identify.files.servo_file import ServoFile
 from idbench.identify.files.servo_log import ServoColumns
 from idbench.identify.servo import Servo, ServoFit, ServoRun, identify_servo
 from idbench.identify.servo.choice import choose_friction, residuals_by_state
-from idbench.identify.servo.fit import TORQUES
 from idbench.identify.servo.law import EXACT, KINDS
-from idbench.identify.servo.mistakes import MISTAKES, ServoMistake
 from idbench.identify.servo.parameters import SERVO_PARAMETERS
 from idbench.identify.servo.run import without_spikes
 from idbench.sim.drives import ServoDrive
@@ -34,7 +32,7 @@ from idbench.sim.settings import per_joint
 
 
 def known_servos(drive: ServoDrive, n: int) -> list[Servo]:
-    """Return gain, supply, largest duty and counts of the servos of n joints."""
+    """Gain, supply, largest duty and counts of the servos of n joints."""
     kp = per_joint(drive.kp, n, "drive.kp").tolist()
     return [Servo(drive.gain, x, drive.supply, drive.duty_limit, drive.counts or EXACT) for x in kp]
 
@@ -78,7 +76,7 @@ class Servos:
         return links(self.robot, self.mounting)
 
     def links_of(self, path: Path) -> Robot:
-        """Return the robot without its drives, with what it carried in a log.
+        """Robot without its drives, with what it carried in a log.
 
         Raises
         ------
@@ -133,7 +131,7 @@ class Servos:
         yield from ((names[j], result) for j, result in self.joints.identified(identify, self.motors(ties)))
 
     def motors(self, ties: Sequence[str]) -> list[list[int]]:
-        """Return the joints of each motor, by patterns of their names, several with commas."""
+        """Joints of each motor, by patterns of their names, several with commas."""
         names, found = self.links.joints, list[list[int]]()
         for tie in ties:
             own = [[j for j, name in enumerate(names) if fnmatchcase(name, pattern)] for pattern in tie.split(",")]
@@ -146,17 +144,17 @@ class Servos:
         return found
 
     def runs_with(self, fits: Mapping[str, ServoFit]) -> dict[str, list[ServoRun]]:
-        """Return runs of the joints that have a fit, while the others move as their fits say."""
+        """Runs of the joints that have a fit, while the others move as their fits say."""
         runs = self.joints.runs_with({self.place(joint): fit for joint, fit in fits.items()})
         return {joint: runs[self.place(joint)] for joint in fits}
 
     def simulated(self, fits: Mapping[str, ServoFit], path: Path) -> dict[str, Array]:
-        """Return the positions of joints from the commands of a log alone [rad], as the log has them, by joint."""
+        """Positions of joints from the commands of a log alone [rad], as the log has them, by joint."""
         k, runs = list(self.logs).index(path), self.runs_with(fits)
         return {joint: fit.simulate([runs[joint][k]])[0] for joint, fit in fits.items()}
 
     def errors(self, fits: Mapping[str, ServoFit]) -> dict[str, Array]:
-        """Return the mean absolute error [rad] of each log, simulated from its commands alone, by joint."""
+        """Mean absolute error [rad] of each log, simulated from its commands alone, by joint."""
         runs = self.runs_with(fits)
         return {joint: fit.errors(runs[joint]) for joint, fit in fits.items()}
 
@@ -178,54 +176,40 @@ class Servos:
         return dict(zip(self.links.joints, map(float, np.sqrt(squares)), strict=True))
 
     def place(self, joint: str) -> int:
-        """Return the number of a joint."""
+        """Number of a joint."""
         return self.links.joints.index(joint)
-
-    def of_logs(self, logs: dict[Path, ServoColumns]) -> "Servos":
-        """Return the same servos with other logs."""
-        return replace(self, logs=logs)
 
 
 def summary_of(fit: ServoFit) -> dict[str, Any]:
     """Summary of a fit."""
-    sigma, bound = fit.standard_errors, fit.bound
-    return {
-        name: {"value": x, "sigma": sigma.get(name), "bound": bound.get(name), "unit": unit_of(fit.servo, name)}
-        | ({"factor": list(fit.factor)} if name in TORQUES and not fit.scaled and name not in fit.known else {})
-        for name, x in fit.p.items()
-    } | gains_of(fit)
+    return {name: _entry(fit, name) for name in fit.p} | gains_of(fit)
+
+
+def _entry(fit: ServoFit, name: str) -> dict[str, Any]:
+    """Value of a parameter with its errors; the factor that it is known up to; nothing of an offset without a scale."""
+    if name == "offset" and name in fit.unscaled:
+        return {"value": None, "sigma": None, "bound": None, "unit": unit_of(fit.servo, name)}
+    sigma, bound = fit.standard_errors.get(name), fit.bound.get(name)
+    entry = {"value": fit.p[name], "sigma": sigma, "bound": bound, "unit": unit_of(fit.servo, name)}
+    return entry | ({"factor": list(fit.factor)} if name in fit.unscaled else {})
 
 
 def gains_of(fit: ServoFit) -> dict[str, Any]:
-    """Return the gains of a loop that commands torques, kp and kd at the joint, with the standard error of their factor a."""
-    servo, sigma = fit.servo, fit.standard_errors.get("a")
+    """Gains of a loop that commands torques, kp and kd at the joint, with the standard error of their factor a."""
+    servo = fit.servo
     if servo.kind == Servo.kind:
         return {}
+    a = _entry(fit, "a")
     stated = {"kp": (servo.slope, "N m/rad"), "kd": (servo.kd + servo.slope * fit.p.get("lead", 0.0), "N m s/rad")}
     return {
-        name: {"value": fit.p["a"] * x, "sigma": None if sigma is None else abs(x) * sigma, "bound": None, "unit": unit}
+        name: a | {"value": a["value"] * x, "sigma": a["sigma"] and abs(x) * a["sigma"], "bound": None, "unit": unit}
         for name, (x, unit) in stated.items()
     }
 
 
 def unit_of(servo: Servo, name: str) -> str:
-    """Return the unit of a parameter; that of a is what its loop commands."""
+    """Unit of a parameter; that of a is what its loop commands."""
     return KINDS[servo.kind].unit if name == "a" else SERVO_PARAMETERS[name].unit
-
-
-def mistake_summary(joint: str, mistake: ServoMistake) -> dict[str, Any]:
-    """Summary of a joint's mistake."""
-    return {
-        "cause": MISTAKES[mistake.letter],
-        "joint": joint,
-        "size": mistake.size,
-        "sigma": mistake.sigma,
-        "unit": SERVO_PARAMETERS[mistake.letter].unit,
-        "p": mistake.p,
-        "alternatives": [[MISTAKES[name], joint] for name in mistake.alternatives],
-        "remedy": f"--find {mistake.letter}",
-        "held_out": list(mistake.errors),
-    }
 
 
 def lacks_summary(fit: ServoFit) -> dict[str, Any]:

@@ -10,19 +10,21 @@ import numpy as np
 
 from idbench.experiments.document import Document
 from idbench.experiments.errors import ExperimentError
+from idbench.experiments.identification.causes import suspect_summary
 from idbench.experiments.identification.robot_model import absolute
 from idbench.experiments.requests.jobs import ServoRequest
-from idbench.experiments.servo.identification import AUTO, Servos, lacks_summary, mistake_summary, summary_of
+from idbench.experiments.servo.identification import AUTO, Servos, lacks_summary, summary_of
 from idbench.experiments.servo.joints import Identified
-from idbench.experiments.servo.servo_text import servo_table, verdict_lines, warnings_of
+from idbench.experiments.servo.servo_text import remedy_of, servo_table, verdict_lines, warnings_of
 from idbench.identify import Array, IdentificationError, SettingError
 from idbench.identify.files.servo_file import ServoFile
 from idbench.identify.files.servo_log import ServoColumns, ordered, read_servo_log
+from idbench.identify.judge.suspect import Suspect
 from idbench.identify.servo import SERVO_FRICTIONS, ServoFit
 from idbench.identify.servo.choice import ServoFrictionChoice
 from idbench.identify.servo.fit import require_possible
 from idbench.identify.servo.law import EXACT, TimeSteps
-from idbench.identify.servo.mistakes import ServoMistake, mistake_of
+from idbench.identify.servo.mistakes import mistake_of
 from idbench.identify.servo.parameters import SERVO_PARAMETERS
 from idbench.identify.telling import stage
 from idbench.sim.robot.position_loops import PositionLoop, position_loops
@@ -42,7 +44,7 @@ class ServosFit:
     """The fit of each joint, or why it has none."""
     choices: Mapping[str, ServoFrictionChoice]
     """The laws of friction that were compared, of joints that have a fit."""
-    mistakes: Mapping[str, ServoMistake] = field(default_factory=dict)
+    mistakes: Mapping[str, Suspect] = field(default_factory=dict)
     """What is wrong with joints, and was proved."""
 
     @property
@@ -94,7 +96,9 @@ class ServosFit:
             **({"laws": laws} if laws else {}),
             "joints": {joint: summary_of(fit) for joint, fit in self.fits.items()},
             "lack_of_fit": {joint: lacks_summary(fit) for joint, fit in self.fits.items()},
-            "diagnosis": [mistake_summary(joint, mistake) for joint, mistake in self.mistakes.items()],
+            "diagnosis": [
+                suspect_summary(mistake, [joint], mistake.unit, remedy_of(mistake)) for joint, mistake in self.mistakes.items()
+            ],
         }
 
     def summary(self) -> dict[str, Any]:
@@ -108,7 +112,7 @@ Heard = Callable[[str, Identified | str, ServosFit], None]
 
 
 def servos_identified(asked: ServoRequest, heard: Heard | None = None) -> ServosFit:
-    """Return the servos of a robot, identified joint by joint.
+    """Servos of a robot, identified joint by joint.
 
     Raises
     ------
@@ -135,7 +139,7 @@ def servos_identified(asked: ServoRequest, heard: Heard | None = None) -> Servos
     return replace(made, mistakes={joint: found for joint, found in tested.items() if found})
 
 
-def _tested(fit: ServoFit) -> ServoMistake | None:
+def _tested(fit: ServoFit) -> Suspect | None:
     """The mistake of a fit; None if there is none, or the tests fail: an estimate is not lost with them."""
     try:
         return mistake_of(fit)
@@ -144,7 +148,7 @@ def _tested(fit: ServoFit) -> ServoMistake | None:
 
 
 def servos_of(asked: ServoRequest) -> tuple[Servos, Servos | None]:
-    """Return the servos with the logs of the fit, and with those that it does not see."""
+    """Servos with the logs of the fit, and with those that it does not see."""
     if asked.robot is None:
         raise ExperimentError("--robot is missing; see idbench servo --help")
     if not asked.log:
@@ -162,7 +166,7 @@ def servos_of(asked: ServoRequest) -> tuple[Servos, Servos | None]:
     read = {path: _read(path, asked, robot.joints, loops) for path in (*logs, *held)}
     notes += [said for _, said in read.values() if said]
     servos = Servos(absolute(asked.robot), mounting, known, {}, tuple(notes))
-    made, others = (servos.of_logs({path: read[path][0] for path in of}) for of in (logs, held))
+    made, others = (replace(servos, logs={path: read[path][0] for path in of}) for of in (logs, held))
     return made, others if held else None
 
 
@@ -190,7 +194,7 @@ def _said(loops: Mapping[str, PositionLoop], known: ServoFile) -> Iterator[str]:
 
 
 def held_of(asked: ServoRequest, joints: Sequence[str]) -> dict[str, dict[str, float]]:
-    """Return the parameters that are known, by joint: what names a joint goes before what names none."""
+    """Parameters that are known, by joint: what names a joint goes before what names none."""
     try:
         values = {name: float(value) for name, value in _stated("--hold", asked.hold).items()}
     except ValueError:
@@ -214,7 +218,7 @@ def held_of(asked: ServoRequest, joints: Sequence[str]) -> dict[str, dict[str, f
 def _read(
     path: Path, asked: ServoRequest, joints: Sequence[str], loops: Mapping[str, PositionLoop]
 ) -> tuple[ServoColumns, str]:
-    """Return a log in the order of the joints, commands as angles, and what was assumed of it."""
+    """A log in the order of the joints, commands as angles, and what was assumed of it."""
     try:
         rows = {name: float(value) for name, value in _stated("--rows", asked.rows).items()}
     except ValueError:

@@ -17,7 +17,7 @@ from idbench.identify.servo.run import without_spikes
 from idbench.identify.servo.stages import searched_runs
 from idbench.identify.servo.tied import tied
 from idbench.identify.telling import stage
-from idbench.sim.robot.inverse_dynamics import BLOCK, InverseDynamics, inverse_dynamics
+from idbench.sim.robot.inverse_dynamics import inverse_dynamics, mass_matrices
 from idbench.sim.robot.robot import Robot
 
 
@@ -37,7 +37,7 @@ class Moving(NamedTuple):
 
 
 def loads(robot: Robot, columns: ServoColumns, moving: Mapping[int, Moving] | None = None) -> list[JointLoad]:
-    """Return the load of each joint of a robot while the others move as they were measured, or as their servos do.
+    """Load of each joint of a robot while the others move as they were measured, or as their servos do.
 
     Gravity follows the joint's own angle exactly; what accelerations and velocities of the others need is that of the measured
     motion, smoothed, or of the simulated one (see `corrected`), by the number of the joint, at each step of its simulation: a
@@ -47,7 +47,7 @@ def loads(robot: Robot, columns: ServoColumns, moving: Mapping[int, Moving] | No
     measured = np.stack([without_spikes(t, x) for x in columns.q.T], axis=1)
     if n == 1:
         still = np.zeros((1, 1))
-        return [JointLoad(_inertias(robot, still)[0][0, 0, 0], *(x[0, 0] for x in _gravity(robot, still)))]
+        return [JointLoad(mass_matrices(robot, still, still, still)[0][0, 0, 0], *(x[0, 0] for x in _gravity(robot, still)))]
     fine = min((of.t for of in (moving or {}).values()), key=lambda x: x[1] - x[0], default=t)
     q, qd, qdd = smoothed(t, measured)
     slow = [np.stack([np.interp(fine, t, x) for x in y.T], axis=1) for y in (q, qd, qdd)]
@@ -58,7 +58,7 @@ def loads(robot: Robot, columns: ServoColumns, moving: Mapping[int, Moving] | No
         slow[1][:, j] -= of.early * slow[2][:, j]
         q[:, j] += of.offset
     q_fine, qd_fine, qdd_fine = slow
-    M, whole = _inertias(robot, q_fine, qd_fine, qdd_fine)
+    M, whole = mass_matrices(robot, q_fine, qd_fine, qdd_fine)
     inertia = np.diagonal(M, axis1=1, axis2=2)
     lightness, shaking = _seen_by_friction(M, qdd_fine, moving or {})
     sines, cosines, _ = _gravity(robot, q)
@@ -73,7 +73,7 @@ def loads(robot: Robot, columns: ServoColumns, moving: Mapping[int, Moving] | No
 
 
 def _seen_by_friction(M: Array, qdd: Array, moving: Mapping[int, Moving]) -> tuple[Array, Array]:
-    """Return diagonals of the inverse mass matrix, and how others' damping shakes each joint, shape (time, joint).
+    """Diagonals of the inverse mass matrix, and how others' damping shakes each joint, shape (time, joint).
 
     MuJoCo finds dry friction by accelerations without what its integrator then takes late of the damping, h D: those are
     (1 + M^-1 h D) a. Zeros where nothing is taken late.
@@ -89,20 +89,8 @@ def _seen_by_friction(M: Array, qdd: Array, moving: Mapping[int, Moving]) -> tup
     return diagonal, np.einsum("tjk,tk->tj", inverse, pushed) - diagonal * pushed
 
 
-def _inertias(robot: Robot, q: Array, qd: Array | None = None, qdd: Array | None = None) -> tuple[Array, Array]:
-    """Return M, shape (time, joint, joint), and the torques of a motion, shape (time, joint)."""
-    qd, qdd = (np.zeros_like(q) if x is None else x for x in (qd, qdd))
-    found = []
-    for some in (slice(i, i + BLOCK) for i in range(0, len(q), BLOCK)):
-        dynamics = InverseDynamics(robot, len(q[some]))
-        whole = dynamics(q[some], qd[some], qdd[some]).copy()
-        found.append((dynamics.mass_matrix.copy(), whole))
-    M, torques = (np.concatenate(x) for x in zip(*found, strict=True))
-    return M, torques
-
-
 def _gravity(robot: Robot, q: Array) -> tuple[Array, Array, Array]:
-    """Return gravity along sine and cosine of each joint's angle while the others stand at q, and of slides, each (time, n).
+    """Gravity along sine and cosine of each joint's angle while the others stand at q, and of slides, each (time, n).
 
     A turn by delta from where a joint is turns the weight that it carries: c cos(delta) + s sin(delta), c being the torque
     there, and s that after a quarter of a turn.
@@ -122,7 +110,7 @@ def _moved(q: Array, j: int) -> Array:
 
 
 def _constant(x: Array) -> Array:
-    """Return one number where all are the same but for rounding."""
+    """One number where all are the same but for rounding."""
     size = float(np.abs(x).max())
     return np.array(x[0] if size > 0 else 0.0) if np.ptp(x) <= 1e-9 * size or size == 0 else x
 
@@ -167,7 +155,7 @@ class Joints:
         return self._loaded([{}] * len(self.logs))
 
     def runs_with(self, fits: Mapping[int, ServoFit]) -> list[list[ServoRun]]:
-        """Return runs of each joint, while others that have a fit move as simulated, corrected by the measured slow motion."""
+        """Runs of each joint, while others that have a fit move as simulated, corrected by the measured slow motion."""
         if self.links.n == 1 or not fits:
             return self.runs
         key = tuple((j, fits[j]) for j in sorted(fits))
@@ -181,7 +169,7 @@ class Joints:
         return {}
 
     def _sweep(self, fits: Mapping[int, ServoFit]) -> list[list[ServoRun]]:
-        """Return runs whose loads follow from the motions of the others, and these from their loads, while they come closer."""
+        """Runs whose loads follow from the motions of the others, and these from their loads, while they come closer."""
         runs, before = self.runs, list[dict[int, Moving]]()
         change = np.inf
         for _ in range(SWEEPS):
@@ -227,7 +215,7 @@ class Joints:
                 yield from tied({j: agreed[j] for j in motor if j in agreed}).items()
 
     def _agreed(self, before: Mapping[int, ServoFit], fits: Mapping[int, ServoFit]) -> dict[int, ServoFit]:
-        """Return fits whose offsets agree, or as they are where a joint is simulated less well with these."""
+        """Fits whose offsets agree, or as they are where a joint is simulated less well with these."""
         moved = self._together(before, fits)
         errors = [self._errors(some) for some in (fits, moved)]
         if all(errors[1][j] <= (1 + WORSE) * errors[0][j] for j in fits):
@@ -235,19 +223,19 @@ class Joints:
         return {j: replace(fit, of_all=moved[j].of_all) for j, fit in fits.items()}
 
     def _errors(self, fits: Mapping[int, ServoFit]) -> dict[int, float]:
-        """Return the mean error of each joint [rad]."""
+        """Mean error of each joint [rad]."""
         runs = self.runs_with(fits)
         return {j: float(np.mean(fit.errors(runs[j]))) for j, fit in fits.items()}
 
     def _together(self, before: Mapping[int, ServoFit], fits: Mapping[int, ServoFit]) -> dict[int, ServoFit]:
-        """Return fits whose offsets agree, of some whose loads assume the offsets of the fits before."""
+        """Fits whose offsets agree, of some whose loads assume the offsets of the fits before."""
         joints = {j: OffsetJoint(fit, {}) for j, fit in fits.items()}
         times = [log.columns.t for log in self.logs]
         moving = [
             {j: m._replace(t=t, q=np.interp(t, m.t, m.q)) for j, m in each.items()}
             for each, t in zip(self._moving(before, self.runs_with(before)), times, strict=True)
         ]
-        assumed = {k: offset_of(fit) for k, fit in before.items() if k in fits and fit.scaled}
+        assumed = {k: fit.offset for k, fit in before.items() if k in fits and fit.scaled}
         now = self._loaded(moving)
         for k, offset in assumed.items():
             runs = self._loaded([{**each, k: each[k]._replace(offset=offset + APART)} for each in moving])
@@ -266,14 +254,14 @@ class Joints:
         """Simulated motion of joints with these loads, in each log."""
         return [
             {
-                j: Moving(*fit.fine(runs[j][k]), offset_of(fit), fit.p["Ia"], fit.taken_late, fit.servo.steps.early)
+                j: Moving(*fit.fine(runs[j][k]), fit.offset, fit.p["Ia"], fit.taken_late, fit.servo.steps.early)
                 for j, fit in fits.items()
             }
             for k in range(len(self.logs))
         ]
 
     def _loaded(self, moving: Sequence[Mapping[int, Moving]]) -> list[list[ServoRun]]:
-        """Return runs of each joint while the others move so, or as they were measured."""
+        """Runs of each joint while the others move so, or as they were measured."""
         every = [[] for _ in self.links.joints]  # type: list[list[ServoRun]]
         for log, by_fits in zip(self.logs, moving, strict=True):
             for j in range(self.links.n):
@@ -295,11 +283,6 @@ class Joints:
 def _apart(one: Sequence[Mapping[int, Moving]], other: Sequence[Mapping[int, Moving]]) -> float:
     """Largest mean difference of motions over joints and logs [rad]."""
     return max(float(np.abs(a[j].q - b[j].q).mean()) for a, b in zip(one, other, strict=True) for j in a)
-
-
-def offset_of(fit: ServoFit) -> float:
-    """Return the offset that others assume of a joint [rad]: it follows from gravity, and is wrong without a scale."""
-    return fit.p["offset"] if fit.scaled else 0.0
 
 
 def _attempt(identify: Callable[[], Identified]) -> tuple[Identified | str, ServoFit | None]:

@@ -16,14 +16,12 @@ import numpy as np
 from idbench.experiments.servo.identification import Servos
 from idbench.identify.servo import SERVO_FRICTIONS, Servo, ServoFit
 from idbench.identify.servo.identification import with_friction
-from idbench.identify.servo.parameters import SERVO_PARAMETERS
+from idbench.identify.servo.parameters import SERVO_PARAMETERS, ServoLaw
 from idbench.sim.robot.servos import Commands, ServoValues, replay, with_servos
-
-NONE = {"rate": float("inf"), "vs": 1.0}  # What parameters are that a servo does not have; others are 0
 
 
 def servo_function(robot: str, fits: Mapping[str, tuple[Servo, ServoFit]], logs: Sequence[str]) -> str:
-    """Return the file: what is known of each joint's servo, and what was found."""
+    """Python file of what is known of each joint's servo, and what was found."""
     text = files("idbench.experiments.exports").joinpath("servo.py.txt").read_text(encoding="utf-8")
     every = {joint: _parameters(servo, fit) for joint, (servo, fit) in fits.items()}
     table = pformat(every, width=110, sort_dicts=False).replace("inf", 'float("inf")')
@@ -40,7 +38,7 @@ def servo_function(robot: str, fits: Mapping[str, tuple[Servo, ServoFit]], logs:
 
 
 def _friction_lines() -> str:
-    """Return the lines of the compiled friction as plain Python, the parameters `p` a table."""
+    """Lines of the compiled friction as plain Python, the parameters `p` a table."""
     from idbench.identify.servo.servo_step import friction
 
     lines: Any = ast.parse(dedent(inspect.getsource(friction.py_func))).body[0]
@@ -51,7 +49,8 @@ def _friction_lines() -> str:
 def _parameters(servo: Servo, fit: ServoFit) -> dict[str, float]:
     known = {"gain": servo.slope, "kd": servo.kd, "supply": servo.supply, "limit": servo.limit, "counts": servo.counts}
     known |= {"speed_limit": servo.speed_limit}
-    return {**known, **{name: float(fit.p.get(name, NONE.get(name, 0.0))) for name in SERVO_PARAMETERS if name != "backlash"}}
+    law = ServoLaw(**fit.p)._asdict()
+    return {**known, **{name: float(law[name]) for name in SERVO_PARAMETERS if name != "backlash"}}
 
 
 EXPRESSIBLE = ("a", "b", "Ia", "Fs", "Fv", "offset", "lag", "lead", "delay", "rate", "backlash")
@@ -70,9 +69,11 @@ def inexpressible(fits: Mapping[str, ServoFit]) -> list[str]:
     found = cannot_express(x for fit in fits.values() for x in fit.free)
     if any("backlash" in fit.free for fit in fits.values()):
         found.append("backlash is written as a second joint; the loop of the dcmotor sees the rotor, before the play")
-    offsets = {joint: fit.p["offset"] for joint, fit in fits.items()}
-    words = ", ".join(f"{joint} {x:+.4g}" for joint, x in offsets.items())
-    return [*found, f"the file's angles are the log's plus an offset [rad]: {words}; add it to commands"]
+    words = ", ".join(f"{joint} {fit.offset:+.4g}" for joint, fit in fits.items())
+    found.append(f"the file's angles are the log's plus an offset [rad]: {words}; add it to commands")
+    if unknown := [joint for joint, fit in fits.items() if "offset" in fit.unscaled]:
+        found.append(f"{', '.join(unknown)}: torques have no scale, so the offset is not known, and taken as 0")
+    return found
 
 
 def without_servo(joints: Sequence[str], fits: Mapping[str, ServoFit]) -> list[str]:
@@ -82,21 +83,21 @@ def without_servo(joints: Sequence[str], fits: Mapping[str, ServoFit]) -> list[s
 
 
 def values_of(parameters: Mapping[str, float], servo: Servo) -> ServoValues:
-    """Return a servo as MuJoCo has it: its parameters by their letters, and what is stated of it."""
-    p = {**dict.fromkeys(("Fv", "lead", "lag", "gain_error", "backlash"), 0.0), "rate": np.inf, **parameters}
-    slope = servo.slope * (1 + p["gain_error"])
-    delay = p["delay"] - servo.steps.early  # of a simulation, which acts early as well
-    drive = p["a"], p["b"], slope, servo.supply, servo.limit, p["Ia"], p["Fv"], p["Fs"], p["rate"], delay, p["backlash"]
-    return ServoValues(*drive, servo.kd + slope * p["lead"], p["lag"], servo.kind == Servo.kind)
+    """A servo as MuJoCo has it: its parameters by their letters, and what is stated of it."""
+    p = ServoLaw(**{"offset": 0.0, **parameters})
+    slope = servo.slope * (1 + p.gain_error)
+    delay = p.delay - servo.steps.early  # of a simulation, which acts early as well
+    drive = p.a, p.b, slope, servo.supply, servo.limit, p.Ia, p.Fv, p.Fs, p.rate, delay, p.backlash
+    return ServoValues(*drive, servo.kd + slope * p.lead, p.lag, servo.kind == Servo.kind)
 
 
 def for_mujoco(fits: Mapping[str, ServoFit]) -> dict[str, ServoFit]:
-    """Return fits with the friction that MuJoCo has, which does not grow with the load: fitted again where it did."""
+    """Fits with the friction that MuJoCo has, which does not grow with the load: fitted again where it did."""
     return {joint: with_friction(fit, "coulomb") if SERVO_FRICTIONS[fit.friction] else fit for joint, fit in fits.items()}
 
 
 def mjcf_of(servos: Servos, fits: Mapping[str, ServoFit], folder: Path, position: bool = False, log: str = "") -> str:
-    """Return the robot's MJCF with the servos that were found; of a log its robot, and what is stated of its servos."""
+    """Robot's MJCF with the servos that were found; of a log its robot, and what is stated of its servos."""
     place = {servos.place(joint): values_of(fit.p, servos.known.servo(joint, log)) for joint, fit in fits.items()}
     return with_servos(servos.known.robot(log) or servos.robot, place, folder, servos.mounting, position)
 
@@ -104,11 +105,11 @@ def mjcf_of(servos: Servos, fits: Mapping[str, ServoFit], folder: Path, position
 def in_mujoco(
     servos: Servos, fits: Mapping[str, ServoFit], folder: Path, path: Path, position: bool = False
 ) -> dict[str, float]:
-    """Return the mean absolute error [rad] of each joint, a log's commands given to the file in plain MuJoCo."""
+    """Mean absolute error [rad] of each joint, a log's commands given to the file in plain MuJoCo."""
     columns = servos.logs[path]
     places = [servos.place(joint) for joint in fits]
     offset = np.zeros(servos.links.n)
-    offset[places] = [fit.p["offset"] for fit in fits.values()]
+    offset[places] = [fit.offset for fit in fits.values()]
     on = None if columns.on is None else columns.on[:, places] > 0.5
     sent = Commands(columns.t, (columns.command + offset)[:, places], places, on)
     text = mjcf_of(servos, fits, folder, position, path.name)

@@ -10,10 +10,11 @@ from idbench.experiments.servo.identification import unit_of
 from idbench.experiments.text import error_percentage, number, of_each
 from idbench.identify import Array
 from idbench.identify.arrays import TINY
+from idbench.identify.judge.suspect import Suspect
 from idbench.identify.servo import ServoFit
 from idbench.identify.servo.choice import ServoFrictionChoice, residuals_by_state
 from idbench.identify.servo.fit import TORQUES
-from idbench.identify.servo.mistakes import EXPLAINED, REMAINING, ServoMistake
+from idbench.identify.servo.mistakes import EXPLAINED, MISTAKES, REMAINING
 from idbench.identify.servo.parameters import SERVO_PARAMETERS
 from idbench.identify.tables import concise
 
@@ -43,6 +44,8 @@ MISTAKEN: Mapping[str, str] = {
 }
 """What mistakes are, in words."""
 
+LETTERS = {cause: letter for letter, cause in MISTAKES.items()}  # The parameter that each cause is
+
 
 def servo_table(fits: Mapping[str, ServoFit]) -> Listing:
     """Table of the parameters with their standard errors."""
@@ -58,12 +61,14 @@ def servo_table(fits: Mapping[str, ServoFit]) -> Listing:
 
 
 def value_of(fit: ServoFit, name: str) -> str:
-    """Return a parameter with its standard error, or the factor that it is known up to."""
+    """A parameter with its standard error, or the factor that it is known up to."""
     if name not in fit.p:
         return ""
     sigma = fit.standard_errors.get(name)
-    if name in TORQUES and not fit.scaled and name not in fit.known:
+    if name in fit.unscaled:
         low, high = fit.factor
+        if name == "offset":
+            return "no scale"
         return f"{number(fit.p[name])} x {low:.2g} to {high:.2g}"
     return f"{number(fit.p[name])} held" if sigma is None else concise(fit.p[name], sigma)
 
@@ -89,8 +94,9 @@ def _warnings(fit: ServoFit, mistaken: bool) -> Iterator[str]:
             "counts right, and does the joint move freely?"
         )
     elif not fit.scaled:
-        named = ", ".join(name for name in TORQUES if name in fit.p and name not in fit.known)
+        named = ", ".join(name for name in TORQUES if name in fit.unscaled)
         low, high = fit.factor
+        offset = ", and the offset not at all" if "offset" in fit.unscaled else ""
         why = "gravity is free as well" if "Mg" in fit.free else "the known load does not set their scale in these logs"
         way = "for torques log more motion, add a known mass to the robot's file, or give one of them (--hold a=0.5)"
         if mistaken:
@@ -98,8 +104,8 @@ def _warnings(fit: ServoFit, mistaken: bool) -> Iterator[str]:
         elif fit.scale > REMAINING * fit.excitation.range:
             why, way = "the model lacks something", "first find out what: kp, gain, zeros, units, torque that was off unlogged?"
         yield (
-            f"{named} are known up to a common factor ({low:.2g} to {high:.2g}), because {why}. Positions are predicted all "
-            f"the same; {way}"
+            f"{named} are known up to a common factor ({low:.2g} to {high:.2g}){offset}, because {why}. Positions are "
+            f"predicted all the same; {way}"
         )
     kind = fit.servo.kind
     if kind == "duty" and not fit.excitation.off and "b" in fit.free:
@@ -125,7 +131,7 @@ def verdict_lines(
     fitted: Mapping[str, Array],
     held_out: Mapping[str, Array],
     moved: Mapping[str, float],
-    mistakes: Mapping[str, ServoMistake],
+    mistakes: Mapping[str, Suspect],
 ) -> list[tuple[str, str]]:
     """Lines, each after its verdict: whether models hold on held-out logs ("unsure" of other lines), and what they lack.
 
@@ -135,31 +141,38 @@ def verdict_lines(
         By joint: the fit, and mean errors of positions in the fitted and in the held-out logs [rad].
     moved : mapping of str to float
         Rms of the motion of the held-out logs about its mean [rad].
-    mistakes : mapping of str to ServoMistake
+    mistakes : mapping of str to Suspect
         What was proved to be wrong.
     """
-    holds = {
-        joint: _holds(fit, fitted[joint], held_out.get(joint), moved.get(joint, 0.0), joint in mistakes)
-        for joint, fit in fits.items()
-    }
-    said = [(joint, f"{word}: {why}" if joint in held_out else why) for joint, (word, why) in holds.items()]
-    word_of = {why: word for (_, why), (word, _) in zip(said, holds.values(), strict=True)}
+    lines = []
+    word_of = dict[str, str]()
+    for joint, fit in fits.items():
+        word, why = _holds(fit, fitted[joint], held_out.get(joint), moved.get(joint, 0.0), joint in mistakes)
+        lines.append((joint, f"{word}: {why}" if joint in held_out else why))
+        word_of[lines[-1][1]] = word
     words = [(joint, mistake_words(mistake)) for joint, mistake in mistakes.items()]
     alike = [(joint, text) for joint, fit in fits.items() if (text := confounded(fit))]
     lacks = [(joint, _lacks(fit)) for joint, fit in fits.items()]
-    rest = [("unsure", line) for lines in (words, alike, lacks) for line in of_each(lines).values()]
-    return [*((word_of[why], line) for why, line in of_each(said).items()), *rest]
+    rest = [("unsure", line) for some in (words, alike, lacks) for line in of_each(some).values()]
+    return [*((word_of[why], line) for why, line in of_each(lines).items()), *rest]
 
 
-def mistake_words(mistake: ServoMistake) -> str:
+def mistake_words(mistake: Suspect) -> str:
     """Mistake, its probability, its rivals, and the proved remedy, in words."""
-    what = MISTAKEN[mistake.letter].format(size=mistake.size, factor=1 + mistake.size)
-    others = f"; or {', '.join(mistake.alternatives)}, which this log cannot distinguish" if mistake.alternatives else ""
-    before, after = mistake.errors
+    letter = LETTERS[mistake.cause]
+    what = MISTAKEN[letter].format(size=mistake.size[0], factor=1 + mistake.size[0])
+    rivals = ", ".join(LETTERS[cause] for cause, _ in mistake.alternatives)
+    others = f"; or {rivals}, which this log cannot distinguish" if rivals else ""
+    before, after = mistake.held_out
     return (
-        f"{what} (p = {mistake.p:.0g}){others}; with --find {mistake.letter} the error of parts that were not fitted "
+        f"{what} (p = {mistake.p:.0g}){others}; with {remedy_of(mistake)} the error of parts that were not fitted "
         f"falls from {before:.2g} to {after:.2g} rad"
     )
+
+
+def remedy_of(mistake: Suspect) -> str:
+    """The option that mends a mistake."""
+    return f"--find {LETTERS[mistake.cause]}"
 
 
 def _holds(fit: ServoFit, fitted: Array, held_out: Array | None, moved: float, mistaken: bool) -> tuple[str, str]:
@@ -170,11 +183,9 @@ def _holds(fit: ServoFit, fitted: Array, held_out: Array | None, moved: float, m
     share = 100 * float(np.mean(held_out)) / max(moved, TINY)
     off = f"its mean error there is {error_percentage(share)} of the motion"
     best = "fair" if mistaken or not fit.explained else "good"
-    if np.mean(held_out) <= 2 * floor:
-        return best, f"the model holds on other logs, {off}"
-    word = best if share <= GOOD else "fair" if share <= FAIR else "poor"
-    if ratio > ALIKE and share > GOOD:
-        word = "poor" if share > FAIR else "fair"
+    exact = bool(np.mean(held_out) <= 2 * floor)
+    word = best if exact or share <= GOOD else "fair" if share <= FAIR else "poor"
+    if ratio > ALIKE and share > GOOD and not exact:
         return word, f"worse on other logs: {off}, {ratio:.2g} times that on the fitted ones"
     return word, f"the model holds on other logs, {off}"
 

@@ -13,7 +13,6 @@ from idbench.identify import MotionLog
 from idbench.identify.basis.block import named
 from idbench.identify.files.servo_log import ServoColumns
 from idbench.identify.servo import ServoFit, identify_servo, parameters_of
-from idbench.identify.servo.fit import TORQUES
 from idbench.sim.drives import ServoDrive
 from idbench.sim.engine.run import Run
 from idbench.sim.robot.payload import Payload
@@ -67,7 +66,7 @@ def servo_columns(law: str, simulated: Run, i: int) -> dict[str, float] | str:
             why.append(str(fit))
             continue
         for name, sigma in fit.standard_errors.items():
-            if name in TORQUES and not fit.scaled:
+            if name in fit.unscaled:
                 continue
             at, bound = named(name, j), fit.bound[name]
             found |= {at: fit.p[name], f"{at}.sigma": sigma, f"{at}.paper_sigma": bound, f"{at}.truth": truth.get(at, np.nan)}

@@ -79,13 +79,15 @@ def left_out(products: Array, known: Array | None = None) -> Array:
     return solved(np.concatenate([every - products, every[None]]), every)
 
 
-def jackknife(without: Array) -> Array:
+def jackknife(without: Array, about: Array | float | None = None) -> Array:
     """Covariance of an estimate from B estimates without a stretch each, shape (stretch, ..., p), shape (..., p, p):
 
     J = (B - 1) / B sum over b of (X_b - mean) (X_b - mean)'
+
+    or about the estimate of all rows, if that is given.
     """
     count = len(without)
-    off = np.moveaxis(without - without.mean(axis=0), 0, -1)
+    off = np.moveaxis(without - (without.mean(axis=0) if about is None else about), 0, -1)
     return np.asarray(np.matmul(off, np.swapaxes(off, -1, -2)) * ((count - 1) / count))
 
 

@@ -12,7 +12,7 @@ class Suspect:
     cause: str
     """What is wrong, in a word."""
     of: str
-    """What it is a mistake of: torque, position, friction, drive, base, link or clock."""
+    """What it is a mistake of: torque, position, friction, drive, base, link or clock; of a servo: loop."""
     joint: int | None
     """Of which joint, from 0; None if it is the whole robot's."""
     size: tuple[float, ...]
@@ -28,7 +28,8 @@ class Suspect:
     alternatives: tuple[tuple[str, int | None], ...]
     """Causes, and joints, that explain as much: the log cannot distinguish them."""
     held_out: tuple[float, float]
-    """Largest error of a torque that changes, on stretches that were not fitted, without and with it [%]."""
+    """Largest error of a torque that changes, on stretches that were not fitted, without and with it [%]; of a servo the rms of
+    its position's, large ones counting less [rad]."""
     evidence: float
     """What it takes of minus twice the logarithm of the likelihood."""
     setting: float = 0.0

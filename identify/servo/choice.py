@@ -8,9 +8,9 @@ import numpy as np
 from scipy.stats import wilcoxon
 
 from idbench.identify.arrays import Array
-from idbench.identify.servo.fit import ServoFit
-from idbench.identify.servo.left_out import left_out, stretches
-from idbench.identify.servo.parameters import SERVO_FRICTIONS, SIMPLER, parameters_of
+from idbench.identify.servo.fit import CLUSTERS, ServoFit
+from idbench.identify.servo.left_out import cross_validate, stretches
+from idbench.identify.servo.parameters import SERVO_FRICTIONS, parameters_of
 from idbench.identify.servo.run import ServoRun
 from idbench.identify.servo.stages import Stages
 
@@ -30,7 +30,7 @@ class ServoLack(NamedTuple):
 
 
 def residuals_by_state(fit: ServoFit) -> list[ServoLack]:
-    """Return residuals by what the joint is doing, the largest first."""
+    """Residuals by what the joint is doing, the largest first."""
     loop = fit.loop
     speed = loop.stacked([np.abs(np.gradient(run.clean, run.t)) for run in loop.runs])
     on = loop.stacked([run.enabled.astype(float) for run in loop.runs]) > 0.5
@@ -52,7 +52,6 @@ def residuals_by_state(fit: ServoFit) -> list[ServoLack]:
 
 
 LEVEL = 0.05  # p value, of all comparisons together, below which a law is better
-PER_PARAMETER = 2  # Parts of the log per parameter of the largest law, each predicted without it
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +76,7 @@ class ServoFrictionChoice:
 def choose_friction(
     runs: Sequence[ServoRun], more: Sequence[str] = (), held: dict[str, float] | None = None
 ) -> ServoFrictionChoice:
-    """Return the laws of friction compared, each by parts of the log that its fit did not see (see `left_out`).
+    """Laws of friction compared, each by parts of the log that its fit did not see (see `cross_validate`).
 
     Laws are taken from the simplest on; a further one replaces the one before if it predicts the parts better and Wilcoxon's
     signed-rank test over them says that this is no chance, at a level of 5 % over all tests (Bonferroni).
@@ -87,18 +86,14 @@ def choose_friction(
     IdentificationError
         As for `identify_servo`.
     """
-    fits = dict[str, ServoFit]()
-    rough = dict[str, dict[str, float]]()
     of_laws = {name for names in SERVO_FRICTIONS.values() for name in names}
     parameters_of("coulomb", (*more, *(name for name in held or {} if name not in of_laws)))
-    stages = Stages.begun(runs, more, held or {})
-    for law in SERVO_FRICTIONS:  # simpler ones come first
-        rough[law] = stages.go(law, (), rough[SIMPLER[law]] if law in SIMPLER else stages.start)
-        fits[law] = stages.fit(law, more, stages.go(law, more, rough[law]) if more else rough[law])
+    stages = Stages.start(runs, more, held or {})
+    fits = {law: stages.fit(law, more) for law in SERVO_FRICTIONS}
     c = 3 * float(np.median([fit.scale for fit in fits.values()]))  # one measure for all
-    clusters = PER_PARAMETER * max(len(fit.free) for fit in fits.values())
+    clusters = CLUSTERS * max(len(fit.free) for fit in fits.values())
     parts = min(stretches(fit.found, fit.loop, clusters) for fit in fits.values())  # the same parts of the log for all laws
-    costs = {law: left_out(fit.found, fit.loop, c, parts).costs for law, fit in fits.items()}
+    costs = {law: cross_validate(fit.found, fit.loop, c, parts).costs for law, fit in fits.items()}
     first, *others = fits
     chosen, p = first, dict[str, float]()
     for law in others:

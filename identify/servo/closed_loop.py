@@ -3,16 +3,14 @@
 import os
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from idbench.identify.arrays import Array
+from idbench.identify.servo.parameters import SERVO_PARAMETERS, ServoLaw
 from idbench.identify.servo.run import ServoRun
-
-if TYPE_CHECKING:
-    from idbench.identify.servo.servo_step import ServoLaw
 
 IN_COUNTS = 0.1  # How far from a whole count a position may be written, as a share of it, and still be one
 
@@ -67,22 +65,20 @@ class ServoLoop:
         """Signals of the runs, shape (run, sample), each with its last value after its end."""
         return np.stack([np.pad(x, (0, self.samples - len(x)), mode="edge") for x in signals])
 
-    def limits(self, limits: Array, free: Sequence[str]) -> Array:
-        """Return limits of parameters, shape (2, p), those of the offset by the ranges of the joint."""
-        found = limits.copy()
-        if "offset" in free:
+    def limits(self, names: Sequence[str]) -> Array:
+        """Smallest and largest values of parameters, shape (2, p), those of the offset by the ranges of the joint."""
+        limits = np.array([[SERVO_PARAMETERS[name].low, SERVO_PARAMETERS[name].high] for name in names]).reshape(-1, 2).T
+        if "offset" in names:
             low, high = zip(*(run.offsets for run in self.runs), strict=True)
-            k = list(free).index("offset")
-            found[:, k] = max(found[0, k], *low), min(found[1, k], *high)
-        return found
+            k = list(names).index("offset")
+            limits[:, k] = max(limits[0, k], *low), min(limits[1, k], *high)
+        return limits
 
     def simulate(self, p: Mapping[str, npt.ArrayLike], ahead: npt.ArrayLike = 0.0) -> Array:
-        """Return positions at the samples of the log [rad], shape (lane, run, sample), for a value of each parameter a lane.
+        """Positions at the samples of the log [rad], shape (lane, run, sample), for a value of each parameter a lane.
 
         `ahead`, shape (lane, run, 3) or less, is how runs begin beside what was measured (see `Begin`) [rad].
         """
-        from idbench.identify.servo.servo_step import ServoLaw  # its compiler takes longer than many a command
-
         lanes = max(np.size(x) for x in p.values())
         every = {name: np.broadcast_to(np.asarray(x, dtype=np.float64), (lanes,)).tolist() for name, x in p.items()}
         laws = [ServoLaw(**{name: x[lane] for name, x in every.items()}) for lane in range(lanes)]
@@ -92,9 +88,13 @@ class ServoLoop:
             list(pool.map(lambda k: self._simulate_run(k, laws, begins[:, k], out[:, k]), range(len(self.runs))))
         return out
 
-    def _simulate_run(self, k: int, laws: "Sequence[ServoLaw]", ahead: Array, out: Array) -> None:
+    def _simulate_run(self, k: int, laws: Sequence[ServoLaw], ahead: Array, out: Array) -> None:
         """Write the positions of a run into `out`, shape (lane, sample)."""
-        from idbench.identify.servo.servo_step import Firmware, at_samples, motion
+        from idbench.identify.servo.servo_step import (
+            Firmware,
+            at_samples,
+            motion,
+        )  # its compiler takes longer than many a command
 
         (before, share) = self._places[k]
         begin = self._begin[k]
@@ -107,7 +107,7 @@ class ServoLoop:
         out[:, len(before) :] = out[:, len(before) - 1 : len(before)]
 
     def _place(self, run: ServoRun) -> tuple[npt.NDArray[np.int64], Array]:
-        """Return the step before each sample, and by how much of a step the sample is later."""
+        """Step before each sample, and by how much of a step the sample is later."""
         x = (run.t - run.t[0]) / self.h
         before = x.astype(np.int64)
         return before, x - before
@@ -125,7 +125,7 @@ class ServoLoop:
 
 
 def count_of(runs: Sequence[ServoRun]) -> float:
-    """Return the angle of a count [rad] if nearly all positions are whole counts, else 0, as where they were filtered.
+    """Angle of a count [rad] if nearly all positions are whole counts, else 0, as where they were filtered.
 
     A joint stops where the firmware sees the next count. There, errors of rounding are not noise: all have one direction.
     """
@@ -136,7 +136,7 @@ def count_of(runs: Sequence[ServoRun]) -> float:
 
 
 def _centred(x: Array) -> Array:
-    """Return the means of held values over the steps about their instants, in which forces act."""
+    """Means of held values over the steps about their instants, in which forces act."""
     return np.concatenate([x[:1], (x[1:] + x[:-1]) / 2])
 
 

@@ -99,5 +99,5 @@ def _saturated(run: ServoRun) -> bool:
 
 
 def _commanded(run: ServoRun) -> float:
-    """Return the root mean square of what the loop commands for the error of the position."""
+    """Root mean square of what the loop commands for the error of the position."""
     return float(run.servo.slope * np.sqrt(np.mean((run.command - run.clean) ** 2)))

@@ -12,7 +12,7 @@ from idbench.identify.errors import SettingError
 from idbench.identify.servo.closed_loop import STATES, ServoLoop, initial_state
 from idbench.identify.servo.excitation import Excitation
 from idbench.identify.servo.law import Servo
-from idbench.identify.servo.left_out import LeftOut, left_out, stretches
+from idbench.identify.servo.left_out import LeftOut, cross_validate, stretches
 from idbench.identify.servo.parameters import SERVO_PARAMETERS
 from idbench.identify.servo.run import ServoRun, part_of
 from idbench.identify.servo.search import Found
@@ -63,7 +63,9 @@ class ServoFit:
     @cached_property
     def left_out(self) -> LeftOut:
         """The fit without each run, or piece of a run."""
-        return left_out(self.found, self.loop, 3 * self.scale, stretches(self.found, self.loop, CLUSTERS * len(self.free)))
+        return cross_validate(
+            self.found, self.loop, 3 * self.scale, stretches(self.found, self.loop, CLUSTERS * len(self.free))
+        )
 
     @property
     def scaled(self) -> bool:
@@ -81,6 +83,18 @@ class ServoFit:
     def known(self) -> frozenset[str]:
         """Parameters that were not searched for."""
         return frozenset(self.p) - set(self.free) - ({"a"} if not self.excitation.loaded else set())
+
+    @cached_property
+    def unscaled(self) -> frozenset[str]:
+        """Parameters that lack the scale of torques: torques, known up to a common factor, and an offset, found by gravity."""
+        if self.scaled:
+            return frozenset()
+        return frozenset({*TORQUES} & {*self.p} - self.known | {"offset"} & {*self.free})
+
+    @property
+    def offset(self) -> float:
+        """Angle of the file minus angle of the log [rad], 0 where torques have no scale to find it by."""
+        return 0.0 if "offset" in self.unscaled else self.p["offset"]
 
     @property
     def explained(self) -> bool:
@@ -120,18 +134,18 @@ class ServoFit:
         return max(float(np.median(np.abs(self.found.residual[self.loop.kept]))), self.loop.step / 4)
 
     def simulate(self, runs: Sequence[ServoRun]) -> list[Array]:
-        """Return the positions of runs from their commands alone [rad], at their samples, without the encoder's rounding."""
+        """Positions of runs from their commands alone [rad], at their samples, without the encoder's rounding."""
         q = ServoLoop(runs, self.loop.h).simulate(self.p)[0]
         return [x[: len(run.t)] for x, run in zip(q, runs, strict=True)]
 
     def fine(self, run: ServoRun) -> tuple[Array, Array]:
-        """Return the steps of a simulation [s], on the clock of a run, and its positions from its commands alone [rad]."""
+        """Steps of a simulation [s], on the clock of a run, and its positions from its commands alone [rad]."""
         t = np.arange(run.t[0], run.t[-1], self.loop.h)
         place = np.searchsorted(run.t, t + 1e-9, side="right") - 1
         return t, self.simulate([part_of(run, place, t=t, q=np.interp(t, run.t, run.clean))])[0]
 
     def errors(self, runs: Sequence[ServoRun]) -> Array:
-        """Return the mean absolute error of each run's position, simulated from its commands alone [rad], without spikes.
+        """Mean absolute error of each run's position, simulated from its commands alone [rad], without spikes.
 
         Of a run that begins in motion, the time is left out over which its unknown beginning matters.
         """
@@ -139,7 +153,7 @@ class ServoFit:
         return np.array([np.abs(run.q - q)[run.read_well & follows].mean() for run, q, follows in every])
 
     def follows(self, runs: Sequence[ServoRun]) -> list[npt.NDArray[np.bool_]]:
-        """Return at which samples of runs another beginning, within what is known of it, would change nothing.
+        """Samples of each run at which another beginning, within what is known of it, would change nothing.
 
         That is another speed, by a count, and a target that is where the joint is. If it changes the second half of a run, too,
         as where nothing holds the joint, all samples are returned.

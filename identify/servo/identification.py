@@ -9,7 +9,8 @@ import numpy as np
 from idbench.identify.arrays import Array
 from idbench.identify.servo.closed_loop import ServoLoop
 from idbench.identify.servo.fit import ServoFit
-from idbench.identify.servo.parameters import FURTHER, limits_of, parameters_of, simpler
+from idbench.identify.servo.left_out import fair_rows
+from idbench.identify.servo.parameters import FURTHER, parameters_of
 from idbench.identify.servo.run import ServoRun
 from idbench.identify.servo.stages import Stages
 from idbench.identify.telling import one_thread
@@ -42,19 +43,16 @@ def per_offset(fit: ServoFit, runs: Sequence[ServoRun], other: Sequence[ServoRun
     other : sequence of ServoRun
         The same, with their loads if the offset of the other joint is larger by `APART`.
     """
-    found, size = fit.found, np.sqrt((fit.found.sensitivity**2).mean(axis=(0, 1)))
-    size = np.where(size > 0, size, 1.0)
     with one_thread():
         q, moved = (ServoLoop(runs, fit.loop.h).simulate(fit.p)[0] for runs in (runs, other))
-    w = (1 + np.abs(found.residual) / (3 * fit.scale)) ** -2
-    free = replace(found.beginnings, w=w).without(found.sensitivity / size) * w[..., None]
-    curvature = np.einsum("rti,rtj->ij", free, found.sensitivity / size)
+    size, J, w, free = fair_rows(fit.found, 3 * fit.scale)
+    free = free * w[..., None] ** 2
     pull = np.einsum("rti,rt->i", free, (q - moved) / APART * fit.loop.kept)
-    return np.asarray(np.linalg.pinv(curvature, 1e-12) @ pull / size)
+    return np.asarray(np.linalg.pinv(np.einsum("rti,rtj->ij", free, J), 1e-12) @ pull / size)
 
 
 def together(joints: Mapping[int, OffsetJoint], assumed: Mapping[int, float]) -> dict[int, ServoFit]:
-    """Return fits whose offsets agree with each other, and whose covariances contain the errors of all offsets.
+    """Fits whose offsets agree with each other, and whose covariances contain the errors of all offsets.
 
     The free parameters of joint j are linear in the offsets o of the others, near those that its loads assume:
     theta_j + B_jk (o_k - assumed_k). Its own offset is one of them, so that the offsets solve a linear system. Where gravity
@@ -95,8 +93,7 @@ def _covariance(j: int, joints: Mapping[int, OffsetJoint], per_error: Array, own
 
 
 def _moved(fit: ServoFit, by: Array, covariance: Array) -> ServoFit:
-    low, high = limits_of(fit.free)
-    moved = np.clip(np.array([fit.p[name] for name in fit.free]) + by, low, high)
+    moved = np.clip(np.array([fit.p[name] for name in fit.free]) + by, *fit.loop.limits(fit.free))
     p = {**fit.p, **dict(zip(fit.free, moved.tolist(), strict=True))}
     return replace(fit, found=replace(fit.found, p=p), of_all=covariance)
 
@@ -107,7 +104,7 @@ def identify_servo(
     more: Sequence[str] = (),
     held: dict[str, float] | None = None,
 ) -> ServoFit:
-    """Return the parameters of a servo, from commands and positions alone.
+    """Parameters of a servo, from commands and positions alone.
 
     Rows that are linear in all but delay and rate limit make the start (`ServoRows`); the closed loop, simulated from the
     commands, is then fitted to the positions (`Search`): with the simpler laws of friction first, each the start of the next.
@@ -131,25 +128,21 @@ def identify_servo(
         If a name is unknown.
     """
     parameters_of(friction, (*more, *(held or {})))
-    stages = Stages.begun(runs, more, held or {})
-    p = stages.start
-    for law in simpler(friction):
-        p = stages.go(law, (), p)
-    return stages.fit(friction, more, stages.go(friction, more, p))
+    return Stages.start(runs, more, held or {}).fit(friction, more)
 
 
 def with_friction(fit: ServoFit, friction: str) -> ServoFit:
-    """Return a fit with a simpler law of friction, which begins with what friction was on average, from where it is."""
+    """A fit with a simpler law of friction, which begins with what friction was on average, from where it is."""
     kept = parameters_of(friction, [name for name in fit.p if name in FURTHER])
     loads = [np.abs(run.load.torque(run.t, run.clean)).mean() for run in fit.loop.runs]
     per_load = sum(fit.p.get(name, 0.0) for name in ("Fl", "Fle", "Fgd"))
     p = {name: x for name, x in fit.p.items() if name in kept} | {"Fs": fit.p["Fs"] + per_load * float(np.mean(loads))}
     held = {name: x for name, x in p.items() if name not in fit.free}
-    return Stages(fit.loop.runs, held, p, cut=False).last(friction, tuple(name for name in fit.free if name in p), p)
+    return Stages(fit.loop.runs, held, p, cut=False).fit_fine(friction, tuple(name for name in fit.free if name in p), p)
 
 
 def identify_again(fit: ServoFit, runs: Sequence[ServoRun]) -> ServoFit:
-    """Return the fit of the same parameters, from where it is, to runs whose loads are known better.
+    """Fit of the same parameters, from where it is, to runs whose loads are known better.
 
     Raises
     ------
@@ -157,4 +150,4 @@ def identify_again(fit: ServoFit, runs: Sequence[ServoRun]) -> ServoFit:
         As for `identify_servo`.
     """
     held = {name: x for name, x in fit.p.items() if name not in fit.free}
-    return Stages(runs, held, fit.p).last(fit.friction, fit.free, fit.p, fit.contrasts)
+    return Stages(runs, held, fit.p).fit_fine(fit.friction, fit.free, fit.p, fit.contrasts)

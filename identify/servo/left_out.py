@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from idbench.identify.arrays import Array
+from idbench.identify.estimators.leave_out import jackknife
 from idbench.identify.servo.closed_loop import ServoLoop
 from idbench.identify.servo.search import Found
 
@@ -29,7 +30,7 @@ class LeftOut:
     """Mean of Fair's function of the residuals of each cluster, by the fit without it [rad^2], shape (cluster,)."""
 
 
-def left_out(found: Found, loop: ServoLoop, c: float, parts: int) -> LeftOut:
+def cross_validate(found: Found, loop: ServoLoop, c: float, parts: int) -> LeftOut:
     """Jackknife over clusters, and the sandwich covariance H^-1 S H^-1.
 
     H is the curvature of the objective, S the covariance of its gradient (P. J. Huber, 1967), both those that are left when
@@ -46,15 +47,12 @@ def left_out(found: Found, loop: ServoLoop, c: float, parts: int) -> LeftOut:
     parts : int
         Stretches of time into which each run is cut (see `stretches`).
     """
-    J, r = found.sensitivity, found.residual
-    size = np.sqrt((J**2).mean(axis=(0, 1)))
-    size = np.where(size > 0, size, 1.0)
-    J = J / size
-    w = 1 / (1 + np.abs(r) / c)
-    free = replace(found.beginnings, w=w**2).without(J)  # w**2: the weight of Fair's function, the derivative of r w
+    r = found.residual
+    size, J, w, free = fair_rows(found, c)
     scores = _summed(free * (w * r)[..., None], parts)
     curvatures = _summed(np.einsum("rti,rtj->rtij", free * (w**2)[..., None], J), parts)
-    S, inverse, without = _jackknife(scores, curvatures)
+    inverse, without = _solved(scores, curvatures)
+    S = jackknife(without, 0.0)
     shifts = (without @ inverse).reshape(parts, len(r), -1)
     lacking = np.concatenate([
         some + np.einsum("rti,ri->rt", part, shift)
@@ -66,8 +64,20 @@ def left_out(found: Found, loop: ServoLoop, c: float, parts: int) -> LeftOut:
     return LeftOut(np.asarray(inverse / sizes), np.asarray(inverse @ S @ inverse / sizes), costs)
 
 
-def _jackknife(scores: Array, curvatures: Array) -> tuple[Array, Array, Array]:
-    """Return the covariance of the gradient, the inverse of its curvature, and the gradient of each cluster left out."""
+def fair_rows(found: Found, c: float) -> tuple[Array, Array, Array, Array]:
+    """Rows of a fit under Fair's function, in which initial states follow the parameters.
+
+    Sizes of the sensitivities, shape (p,), the sensitivities over these, shape (run, sample, p), the roots of the second
+    derivatives of Fair's function, shape (run, sample), and the sensitivities that initial states leave.
+    """
+    size = np.sqrt((found.sensitivity**2).mean(axis=(0, 1)))
+    size = np.where(size > 0, size, 1.0)
+    J, w = found.sensitivity / size, 1 / (1 + np.abs(found.residual) / c)
+    return size, J, w, replace(found.beginnings, w=w**2).without(J)
+
+
+def _solved(scores: Array, curvatures: Array) -> tuple[Array, Array]:
+    """Inverse of the curvature, and the gradient of each cluster left out, H (H - H_b)^-1 s_b, shape (cluster, p)."""
     H = curvatures.sum(axis=0)
     H = (H + H.T) / 2
     values, vectors = np.linalg.eigh(H)
@@ -77,25 +87,24 @@ def _jackknife(scores: Array, curvatures: Array) -> tuple[Array, Array, Array]:
     for k, (score, curvature) in enumerate(zip(scores, curvatures, strict=True)):
         leverage, axes = np.linalg.eigh(back @ (curvature + curvature.T) / 2 @ back.T)
         without[k] = root @ (axes @ (axes.T @ (back @ score) / (1 - np.minimum(leverage, MOST_LEVERAGE))))
-    clusters = len(scores)
-    return without.T @ without * (clusters - 1) / clusters, back.T @ back, without
+    return back.T @ back, without
 
 
 def _summed(x: Array, parts: int) -> Array:
-    """Return sums over parts of each run, shape (cluster, ...)."""
+    """Sums over parts of each run, shape (cluster, ...)."""
     split = np.array_split(x, parts, axis=1)
     return np.concatenate([part.sum(axis=1) for part in split])
 
 
 def stretches(found: Found, loop: ServoLoop, clusters: int) -> int:
-    """Return into how many stretches runs are cut: enough for so many clusters, no more than correlations allow."""
+    """Number of stretches of each run: enough for so many clusters, no more than correlations allow."""
     r = found.residual
     wanted, least = (int(np.ceil(x / len(r))) for x in (clusters, MIN_CLUSTERS))
     return max(least, min(wanted, loop.samples // _correlated(r)))
 
 
 def _correlated(r: Array) -> int:
-    """Return over how many samples residuals are correlated."""
+    """Correlation length of residuals [samples]."""
     power = np.abs(np.fft.rfft(r, 2 * r.shape[1], axis=1)) ** 2
     correlation = np.fft.irfft(power.mean(axis=0))[: r.shape[1]]
     small = np.flatnonzero(correlation < UNCORRELATED * correlation[0])

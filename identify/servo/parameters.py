@@ -5,7 +5,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from idbench.identify.arrays import Array
 from idbench.identify.errors import SettingError
 
 SERVO_FRICTIONS: dict[str, tuple[str, ...]] = {
@@ -23,19 +22,6 @@ other when the motor drives (Fgd) than when it is driven (Fgb)."""
 SIMPLER = {"stribeck": "coulomb", "load": "coulomb", "load-stribeck": "load", "directional": "load", "gear": "stribeck"}
 SIMPLER |= {"quadratic": "directional"}
 """The law of which each is a further one."""
-
-
-def simpler(law: str) -> list[str]:
-    """Return the laws that a law extends, the simplest first.
-
-    Examples
-    --------
-    >>> from idbench.identify.servo.parameters import simpler
-    >>> simpler("load-stribeck")
-    ['coulomb', 'load']
-    """
-    inner = SIMPLER.get(law)
-    return [] if inner is None else [*simpler(inner), inner]
 
 
 def start_parameters(law: str, p: Mapping[str, float], speed: float) -> dict[str, float]:
@@ -63,6 +49,38 @@ class ServoParameter(NamedTuple):
     """Smallest value."""
     high: float = float("inf")
     """Largest value."""
+
+
+class ServoLaw(NamedTuple):
+    """Parameters of a servo, by the letters of `SERVO_PARAMETERS`; by default those of other laws do nothing."""
+
+    a: float
+    b: float
+    Ia: float
+    Fs: float
+    Fv: float
+    offset: float
+    delay: float
+    rate: float = np.inf
+    lag: float = 0.0
+    lead: float = 0.0
+    dead_band: float = 0.0
+    gain_error: float = 0.0
+    scale_error: float = 0.0
+    zero: float = 0.0
+    bias: float = 0.0
+    backlash: float = 0.0
+    Mg: float = 0.0
+    Fo: float = 0.0
+    Fst: float = 0.0
+    vs: float = 1.0
+    Fl: float = 0.0
+    Fls: float = 0.0
+    Fle: float = 0.0
+    Flm: float = 0.0
+    Flq: float = 0.0
+    Fgd: float = 0.0
+    Fgb: float = 0.0
 
 
 NEGATIVE = float("-inf")
@@ -105,7 +123,7 @@ FURTHER = ("lag", "lead", "dead_band", "backlash", "gain_error", "scale_error", 
 
 
 def parameters_of(friction: str, more: Sequence[str] = ()) -> tuple[str, ...]:
-    """Return the parameters that may be found of a servo with a law of friction, in their order.
+    """Parameters that may be found of a servo with a law of friction, in their order.
 
     Raises
     ------
@@ -121,12 +139,7 @@ def parameters_of(friction: str, more: Sequence[str] = ()) -> tuple[str, ...]:
     return tuple(name for name in SERVO_PARAMETERS if name in (*known, *more))
 
 
-def step_of(name: str, value: float, scales: dict[str, float]) -> float:
+def step_of(name: str, value: float, scales: Mapping[str, float]) -> float:
     """Step of finite differences of a parameter."""
     parameter = SERVO_PARAMETERS[name]
     return parameter.relative * abs(value) if parameter.relative else parameter.share * scales[parameter.of]
-
-
-def limits_of(names: Sequence[str]) -> Array:
-    """Return the smallest and the largest values of parameters, shape (2, p)."""
-    return np.array([[SERVO_PARAMETERS[name].low, SERVO_PARAMETERS[name].high] for name in names]).reshape(-1, 2).T

@@ -4,10 +4,11 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 
 import numpy as np
-from scipy.signal import butter, sosfiltfilt
+from scipy.signal import butter
 
 from idbench.identify.arrays import Array
 from idbench.identify.servo.run import ServoRun
+from idbench.identify.signals.filters import forward_backward
 
 CUTOFF = 1 / 12  # Cut-off of the low-pass, as a share of the sampling frequency: motion lies below, differentiated counts above
 
@@ -19,8 +20,8 @@ joints were then off by 3, 9 and 30 mN m; by 4, 13 and 54 uncorrected, by 21 whe
 
 
 def low_passed(x: Array, cutoff: float = CUTOFF) -> Array:
-    """Return signals of a uniform clock, shape (time, ...), without what lies above the cut-off; none is late."""
-    return np.asarray(sosfiltfilt(_sections(cutoff), x, axis=0))
+    """Signals of a uniform clock, shape (time, ...), without what lies above the cut-off; none is late."""
+    return np.moveaxis(forward_backward(_sections(cutoff), np.moveaxis(x, 0, -1)), -1, 0)
 
 
 @cache
@@ -29,7 +30,7 @@ def _sections(cutoff: float) -> Array:
 
 
 def smoothed(t: Array, q: Array, cutoff: float = CUTOFF) -> tuple[Array, Array, Array]:
-    """Return smoothed positions, velocities and accelerations at the times of a log, shape (time, joint)."""
+    """Smoothed positions, velocities and accelerations at the times of a log, shape (time, joint)."""
     T = float(np.median(np.diff(t)))
     clock = np.arange(t[0], t[-1] + T / 2, T)
     uniform = low_passed(np.stack([np.interp(clock, t, x) for x in q.T], axis=1), cutoff)
@@ -40,7 +41,7 @@ def smoothed(t: Array, q: Array, cutoff: float = CUTOFF) -> tuple[Array, Array, 
 
 
 def corrected(fine: Array, simulated: Array, t: Array, measured: Array) -> tuple[Array, Array, Array]:
-    """Return positions, velocities and accelerations of a simulated motion, corrected by the measured one, shape (fine,).
+    """Positions, velocities and accelerations of a simulated motion, corrected by the measured one, shape (fine,).
 
     Simulated positions are at fine times, measured ones at those of a log. The residual is added below `DRIFT_CUTOFF`. Jolts,
     which encoder counts hide, come from the simulation, drift from neither.
@@ -82,14 +83,14 @@ class ServoRows:
         self.fast = max(run.fast for run in self._runs)
 
     def starts(self) -> list[dict[str, float]]:
-        """Return parameters for each delay and rate limit that is tried, those whose rows fit best first."""
+        """Parameters for each delay and rate limit that is tried, those whose rows fit best first."""
         limited = self.fast and any(run.run.servo.kind == "duty" for run in self._runs)
         rates = [np.inf, *(self.fast * np.geomspace(0.5, 1.3, RATES)).tolist()] if limited else [np.inf]
         found = [pair for rate in rates for pair in self._of_rate(rate)]
         return [p for _, p in sorted(found, key=lambda pair: pair[0])]
 
     def _of_rate(self, rate: float) -> list[tuple[float, dict[str, float]]]:
-        """Return residual and parameters for each delay, targets keeping within a rate [rad/s]."""
+        """Residual and parameters for each delay, targets keeping within a rate [rad/s]."""
         driven = np.concatenate([run.driven(rate) for run in self._runs])
         motion, Y = (np.concatenate(x) for x in zip(*[run.motion for run in self._runs], strict=True))
         found = []
@@ -99,7 +100,7 @@ class ServoRows:
         return [pair for pair in found if pair]
 
     def _solved(self, W: Array, Y: Array, delay: float, rate: float) -> tuple[float, dict[str, float]] | None:
-        """Return residual and linear parameters; None if they make no servo."""
+        """Residual and linear parameters; None if they make no servo."""
         size = np.sqrt((W**2).sum(axis=0))
         X, used = np.zeros(len(COLUMNS)), size > 0
         for column, value in self._held.items():
@@ -138,7 +139,7 @@ class _Uniform:
         self.motion = filtered[:, :-1], filtered[:, -1]
 
     def driven(self, rate: float) -> Array:
-        """Return the columns of a and of the offset for each delay, shape (time, delay, 2)."""
+        """Columns of a and of the offset for each delay, shape (time, delay, 2)."""
         from idbench.identify.servo.servo_step import targets
 
         run, servo = self.run, self.run.servo

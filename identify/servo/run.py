@@ -59,7 +59,7 @@ class JointLoad:
 
     @classmethod
     def pendulum(cls, mass: float, length: float) -> Self:
-        """Return a point mass [kg] at a distance [m] from the axis, which is horizontal; q = 0 hangs down.
+        """A point mass [kg] at a distance [m] from the axis, which is horizontal; q = 0 hangs down.
 
         Examples
         --------
@@ -72,14 +72,14 @@ class JointLoad:
         return cls(np.array(mass * length**2), np.array(mass * G * length), none, none)
 
     def over(self, t: Array) -> tuple[Array, ...]:
-        """Return its parts at some times [s], each of their shape."""
+        """Its parts at some times [s], each of their shape."""
         return tuple(
             np.interp(t, self.t, x) if x.ndim and self.t is not None else np.broadcast_to(x, np.shape(t))
             for x in (getattr(self, name) for name in PARTS)
         )
 
     def torque(self, t: Array, q: Array) -> Array:
-        """Return the torque that keeps the joint at q [rad] at times t [s] while the others move as measured [N m]."""
+        """Torque that keeps the joint at q [rad] at times t [s] while the others move as measured [N m]."""
         _, sine, cosine, rest, *_ = self.over(t)
         return np.asarray(sine * np.sin(q) + cosine * np.cos(q) + rest)
 
@@ -98,7 +98,7 @@ def well_read(q: Array) -> npt.NDArray[np.bool_]:
 
 
 def without_spikes(t: Array, q: Array) -> Array:
-    """Return positions of a joint [rad], shape (time,), spikes interpolated."""
+    """Positions of a joint [rad], shape (time,), spikes interpolated."""
     well = well_read(q)
     return np.interp(t, t[well], q[well])
 
@@ -208,7 +208,7 @@ MOVES = 4  # Counts by which a joint moves in a piece that says anything
 
 
 def pieces(run: ServoRun, delay: float) -> list[ServoRun]:
-    """Return a run in pieces that begin at rest, the target of the firmware where the command is.
+    """A run in pieces that begin at rest, the target of the firmware where the command is.
 
     Parameters
     ----------
@@ -249,6 +249,6 @@ def _rests(run: ServoRun, some: slice, step: float) -> bool:
 
 
 def part_of(run: ServoRun, some: slice | npt.NDArray[np.intp], **others: Array) -> ServoRun:
-    """Return some samples of a run, with other values of some of its signals."""
+    """Some samples of a run, with other values of some of its signals."""
     names = ("t", "q", "command", "on", "voltage", "forward")
     return replace(run, **{name: x[some] for name in names if (x := getattr(run, name)) is not None} | others)

@@ -4,8 +4,9 @@ Friction that holds, limits that engage and motions that are thrown make the sum
 steps mislead, wide ones, and samples spread as the normal equations say, go on.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 from scipy.special import ndtri
@@ -13,7 +14,7 @@ from scipy.special import ndtri
 from idbench.identify.arrays import Array
 from idbench.identify.nuisances import Nuisances
 from idbench.identify.servo.closed_loop import STATES, ServoLoop
-from idbench.identify.servo.parameters import SERVO_PARAMETERS, limits_of, step_of
+from idbench.identify.servo.parameters import SERVO_PARAMETERS, step_of
 
 DAMPINGS = 10.0 ** np.arange(-2.0, 4.0)  # Marquardt's parameter, as multiples of the last one that helped
 SAMPLES = 12  # Samples a round, in pairs
@@ -48,47 +49,48 @@ class Found:
     Their precision is the variance of residuals over that of a position that was rounded."""
 
 
+@dataclass(frozen=True, eq=False)
 class ServoSearch:
-    """Minimizes the sum of Fair's function of the residuals, which grows like their size where they are large.
+    """Minimizer of the sum of Fair's function of the residuals, which grows like their size where they are large."""
 
-    Parameters
-    ----------
-    loop : ServoLoop
-        Runs to be simulated.
-    free : sequence of str
-        Parameters that are searched for.
-    scales : mapping of str to float
-        Typical sizes, by what `ServoParameter.of` names.
-    c : float
-        Size of a residual from which on it counts less than its square [rad].
-    """
+    loop: ServoLoop
+    """Runs to be simulated."""
+    free: tuple[str, ...]
+    """Parameters that are searched for."""
+    scales: Mapping[str, float]
+    """Typical sizes, by what `ServoParameter.of` names."""
+    c: float
+    """Size of a residual from which on it counts less than its square [rad]."""
 
-    def __init__(self, loop: ServoLoop, free: Sequence[str], scales: Mapping[str, float], c: float) -> None:
-        self._loop = loop
-        self.free = tuple(free)
-        self._scales = dict(scales)
-        self.c = c
-        self._count = loop.step or c / 3  # where positions are exact, runs begin as near as they follow
-        # Residuals are a third of c in the median; a rounded position is off by its twelfth.
-        self._certainty = float((c / 3 / MEDIAN) ** 2 / (self._count**2 / 12))
-        self._low, self._high = loop.limits(limits_of(self.free), self.free)
-        self._relative = np.array([SERVO_PARAMETERS[name].relative > 0 for name in self.free], dtype=bool)
+    def without(self, name: str) -> Self:
+        """The same search with a parameter held."""
+        return replace(self, free=tuple(other for other in self.free if other != name))
+
+    @property
+    def _count(self) -> float:
+        """Angle by which runs may begin elsewhere [rad]: where positions are exact, as near as they follow."""
+        return self.loop.step or self.c / 3
+
+    @property
+    def _certainty(self) -> float:
+        """Variance of residuals, a third of c in the median, over that of a rounded position, a twelfth of its square."""
+        return float((self.c / 3 / MEDIAN) ** 2 / (self._count**2 / 12))
 
     def cost(self, q: Array, ahead: Array | float = 0.0) -> Array:
-        """Return the objective of simulated positions, shape (lane,), of runs that begin ahead, shape (lane, run, 3)."""
-        r = np.abs(self._loop.q - q) * self._loop.kept / self.c
+        """Objective of simulated positions, shape (lane,), of runs that begin ahead, shape (lane, run, 3)."""
+        r = np.abs(self.loop.q - q) * self.loop.kept / self.c
         total = 2 * self.c**2 * (r - np.log1p(r)).sum(axis=(1, 2)) + self._certainty * (
             np.square(ahead).sum(axis=(-2, -1)) if np.ndim(ahead) else 0.0
         )
         return np.nan_to_num(total, nan=np.inf, posinf=np.inf)
 
     def best(self, start: Mapping[str, float], rounds: int) -> Found:
-        """Return the best parameters that are found from a start.
+        """Best parameters that are found from a start.
 
         Levenberg and Marquardt, x(k+1) = x(k) - (J' J + mu D)^-1 J' r, initial positions eliminated (Schur complement);
         several mu, and samples about the step, are simulated at once, and the best of all is x(k+1).
         """
-        x, ahead = np.array([start[name] for name in self.free]), np.zeros((len(self._loop.runs), STATES))
+        x, ahead = np.array([start[name] for name in self.free]), np.zeros((len(self.loop.runs), STATES))
         width = 1.0
         damping = 1e-2
         idle = 0
@@ -98,8 +100,8 @@ class ServoSearch:
             tried, cost, J, r, beginnings = self._differences(start, x, ahead, width)
             normal = self._normal(J, r, ahead, beginnings)
             steps, promised = self._steps(normal, damping), float(normal.gradient @ normal.inverse @ normal.gradient)
-            scattered = self._scattered(rng, normal, spread * np.sqrt(0.02 * cost[0] / len(x)))
-            more = self._within(x, np.concatenate([steps, scattered]))
+            samples = self._sample_steps(rng, normal, spread * np.sqrt(0.02 * cost[0] / len(x)))
+            more = self._within(x, np.concatenate([steps, samples]))
             begins = np.clip(ahead + normal.begin(more - x), -AHEAD * self._count, AHEAD * self._count)
             further = self.cost(self._simulated(start, more, begins), begins)
             every, costs = np.concatenate([tried, more]), np.concatenate([cost, further])
@@ -120,7 +122,7 @@ class ServoSearch:
         return self._found({**start, **dict(zip(self.free, x.tolist(), strict=True))}, ahead, min(width, 0.5))
 
     def at(self, found: Found) -> Found:
-        """Return residuals and sensitivities where another search ended."""
+        """Residuals and sensitivities where another search ended."""
         return self._found(found.p, found.ahead, 0.5)
 
     def _found(self, p: dict[str, float], ahead: Array, width: float) -> Found:
@@ -128,8 +130,8 @@ class ServoSearch:
         _, cost, J, r, beginnings = self._differences(p, x, ahead, width)
         return Found(p, float(cost[0]), r, J, ahead, beginnings)
 
-    def away(self, found: Found) -> list[dict[str, float]]:
-        """Return parameters on both sides of what was found, along the axes that are known worst: other valleys lie there."""
+    def axis_points(self, found: Found) -> list[dict[str, float]]:
+        """Parameters on both sides of what was found, along the axes that are known worst: other valleys lie there."""
         x = np.array([found.p[name] for name in self.free])
         normal = self._normal(found.sensitivity, found.residual, found.ahead, found.beginnings)
         values, axes = np.linalg.eigh((normal.A + normal.A.T) / 2)
@@ -146,32 +148,33 @@ class ServoSearch:
         return [{**found.p, **dict(zip(self.free, one.tolist(), strict=True))} for one in tried]
 
     def _within(self, x: Array, steps: Array) -> Array:
-        """Return x with steps, which change no parameter whose size is known by more than a third."""
-        most = np.where(self._relative, np.abs(x) / 3, np.inf)
-        return np.clip(x + np.clip(steps, -most, most), self._low, self._high)
+        """X with steps, which change no parameter whose size is known by more than a third."""
+        relative = np.array([SERVO_PARAMETERS[name].relative > 0 for name in self.free], dtype=bool)
+        most = np.where(relative, np.abs(x) / 3, np.inf)
+        return np.clip(x + np.clip(steps, -most, most), *self.loop.limits(self.free))
 
     def _simulated(self, start: Mapping[str, float], X: Array, ahead: Array) -> Array:
         lanes: dict[str, Array | float] = {**start, **dict(zip(self.free, X.T, strict=True))}
-        return self._loop.simulate(lanes | {"a": np.broadcast_to(lanes["a"], (len(X),))}, ahead)
+        return self.loop.simulate(lanes | {"a": np.broadcast_to(lanes["a"], (len(X),))}, ahead)
 
     def _differences(
         self, start: Mapping[str, float], x: Array, ahead: Array, width: float
     ) -> tuple[Array, Array, Array, Array, Nuisances]:
-        """Return points about x, their costs, sensitivity and residual at x, and other beginnings as unknowns."""
-        h = width * np.array([step_of(name, value, self._scales) for name, value in zip(self.free, x, strict=True)])
+        """Points about x, their costs, sensitivity and residual at x, and other beginnings as unknowns."""
+        h = width * np.array([step_of(name, value, self.scales) for name, value in zip(self.free, x, strict=True)])
         upper = x + np.diag(h)
-        lower = np.maximum(x - np.diag(h), self._low)
+        lower = np.maximum(x - np.diag(h), self.loop.limits(self.free)[0])
         n = len(x)
         tried, half = np.concatenate([x[None], upper, lower]), self._count / 2
         sides = half * np.concatenate([np.eye(STATES), -np.eye(STATES)])[:, None, :]
         begins = np.concatenate([np.repeat(ahead[None], len(tried), axis=0), ahead + sides])
         q = self._simulated(start, np.concatenate([tried, np.repeat(x[None], 2 * STATES, axis=0)]), begins)
-        wide, kept = np.diagonal(upper - lower), self._loop.kept
+        wide, kept = np.diagonal(upper - lower), self.loop.kept
         wide = np.where(wide > 0, wide, np.inf)  # what has come to zero, in steps of shares of itself, has no effect
         J = np.moveaxis(q[1 : n + 1] - q[n + 1 : 2 * n + 1], 0, -1) / wide * kept[..., None]
         apart = np.moveaxis(q[-2 * STATES : -STATES] - q[-STATES:], 0, -1) / self._count
         beginnings = Nuisances(apart * kept[..., None], self._certainty)
-        return tried, self.cost(q[: -2 * STATES], ahead), J, (self._loop.q - q[0]) * kept, beginnings
+        return tried, self.cost(q[: -2 * STATES], ahead), J, (self.loop.q - q[0]) * kept, beginnings
 
     def _normal(self, J: Array, r: Array, ahead: Array, beginnings: Nuisances) -> "_Normal":
         w = 1 / (1 + np.abs(r) / self.c)
@@ -185,7 +188,7 @@ class ServoSearch:
         every = [np.linalg.solve(normal.A + damping * d * eye, normal.gradient) / normal.size for d in DAMPINGS]
         return np.array(every)
 
-    def _scattered(self, rng: np.random.Generator, normal: "_Normal", spread: float) -> Array:
+    def _sample_steps(self, rng: np.random.Generator, normal: "_Normal", spread: float) -> Array:
         size = normal.size
         root = np.linalg.cholesky(np.linalg.inv(normal.A + 1e-3 * np.eye(len(size))))
         z = spread * (rng.standard_normal((SAMPLES // 2, len(size))) @ root.T) / size

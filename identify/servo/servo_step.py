@@ -9,40 +9,9 @@ import numpy.typing as npt
 from idbench.identify.arrays import Array
 from idbench.identify.compiled import compiled
 from idbench.identify.servo.law import TimeSteps
+from idbench.identify.servo.parameters import ServoLaw
 
 LIGHT = 1e-9  # Inertia of a link that has none, beside that of its rotor
-
-
-class ServoLaw(NamedTuple):
-    """Parameters of a servo, by the letters of `SERVO_PARAMETERS`, and what makes those of other laws do nothing."""
-
-    a: float
-    b: float
-    Ia: float
-    Fs: float
-    Fv: float
-    offset: float
-    delay: float
-    rate: float = math.inf
-    lag: float = 0.0
-    lead: float = 0.0
-    dead_band: float = 0.0
-    gain_error: float = 0.0
-    scale_error: float = 0.0
-    zero: float = 0.0
-    bias: float = 0.0
-    backlash: float = 0.0
-    Mg: float = 0.0
-    Fo: float = 0.0
-    Fst: float = 0.0
-    vs: float = 1.0
-    Fl: float = 0.0
-    Fls: float = 0.0
-    Fle: float = 0.0
-    Flm: float = 0.0
-    Flq: float = 0.0
-    Fgd: float = 0.0
-    Fgb: float = 0.0
 
 
 class Firmware(NamedTuple):
@@ -85,7 +54,7 @@ class Acting(NamedTuple):
 
 @compiled
 def friction(p: ServoLaw, speed: float, motor: float, external: float, sent: float) -> float:
-    """Return the torque by which friction can resist at most [N m]."""
+    """Torque by which friction can resist at most [N m]."""
     total = p.Fs
     load = abs(external - motor)
     if p.Fst != 0.0 or p.Fls != 0.0:
@@ -98,7 +67,7 @@ def friction(p: ServoLaw, speed: float, motor: float, external: float, sent: flo
 
 @compiled
 def _slowed(free: float, speed: float, most: float) -> float:
-    """Return the speed after a step in which friction takes away at most `most`.
+    """Speed after a step in which friction takes away at most `most`.
 
     It resists the motion that there was until that ends, within the step or not, and takes of what drives it on from there at
     most all.
@@ -116,7 +85,7 @@ def _slowed(free: float, speed: float, most: float) -> float:
 def _pushed(
     p: ServoLaw, firmware: Firmware, q: float, speed: float, target: float, forward: float, voltage: float
 ) -> tuple[float, float]:
-    """Return the torque of the winding without what damps, and the damping of the loop: nothing beyond its limit."""
+    """Torque of the winding without what damps, and the damping of the loop: nothing beyond its limit."""
     gain = firmware.gain * (1 + p.gain_error)
     seen = q - p.offset
     if firmware.angle > 0.0:
@@ -143,7 +112,7 @@ def _pushed(
 
 @compiled
 def _after(p: ServoLaw, firmware: Firmware, of: Acting, speed: float, h: float) -> float:
-    """Return the speed of rotor and link as one body after a step."""
+    """Speed of rotor and link as one body after a step."""
     damping = p.b * of.on + of.damping
     light = 1 / (of.J + p.Ia + firmware.steps.joint * p.Fv + firmware.steps.loop * damping)
     half = h / 2 * (damping + p.Fv) * light
@@ -165,7 +134,7 @@ def _after(p: ServoLaw, firmware: Firmware, of: Acting, speed: float, h: float) 
 def _apart(
     p: ServoLaw, firmware: Firmware, of: Acting, link: float, rotor: float, gap: float, h: float
 ) -> tuple[float, float, float]:
-    """Return speeds of link and rotor, and their gap: each by itself, and as one body where one would leave the play."""
+    """Speeds of link and rotor, and their gap: each by itself, and as one body where one would leave the play."""
     half = p.backlash / 2
     J = max(of.J, LIGHT * p.Ia)
     free_link, free_rotor = (
@@ -184,7 +153,7 @@ def _apart(
 
 @compiled
 def targets(command: Array, rate: float, h: float, lag: float = 0.0, ahead: float = 0.0) -> Array:
-    """Return the mean over each step h [s] of what follows a command within a rate [rad/s], low-passed with a time constant.
+    """Mean over each step h [s] of what follows a command within a rate [rad/s], low-passed with a time constant.
 
     It begins `ahead` of the first command [rad].
     """
@@ -204,7 +173,7 @@ def targets(command: Array, rate: float, h: float, lag: float = 0.0, ahead: floa
 
 @compiled
 def motion(p: ServoLaw, firmware: Firmware, track: Track, start: tuple[float, float, float], h: float, fastest: float) -> Array:
-    """Return the angle of the log at each step [rad]; no speed gets beyond the fastest.
+    """Angle of the log at each step [rad]; no speed gets beyond the fastest.
 
     It starts from an angle of the log, a speed, and by how much the target is ahead of the command. Leapfrog: speeds in the
     middle of steps, positions at their ends; damping is implicit, so that the result is of second order
@@ -243,7 +212,7 @@ def motion(p: ServoLaw, firmware: Firmware, track: Track, start: tuple[float, fl
 
 @compiled
 def at_samples(q: Array, before: npt.NDArray[np.int64], share: Array, count: float) -> Array:
-    """Return positions between steps, linearly; at rest to the count [rad], if it is above 0."""
+    """Positions between steps, linearly; at rest to the count [rad], if it is above 0."""
     out = np.empty(len(before))
     for k in range(len(before)):
         change = q[before[k] + 1] - q[before[k]]

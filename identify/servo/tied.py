@@ -7,7 +7,7 @@ import numpy as np
 
 from idbench.identify.arrays import TINY, Array
 from idbench.identify.servo.fit import ServoFit
-from idbench.identify.servo.left_out import left_out
+from idbench.identify.servo.left_out import cross_validate
 from idbench.identify.servo.search import ServoSearch
 from idbench.identify.servo.stages import Stages
 
@@ -15,7 +15,7 @@ OF_JOINT = ("offset", "bias", "zero", "scale_error", "Mg")  # Parameters of a jo
 
 
 def tied(fits: Mapping[int, ServoFit]) -> dict[int, ServoFit]:
-    """Return the fits of joints with one value of each parameter of their motor.
+    """Fits of joints with one value of each parameter of their motor.
 
     With x_j the parameters of joint j, c those of its motor, H_j the curvature of its objective over the variance of its
     residuals, and M_j that of c with the others free (Schur complement), the motor's are
@@ -30,7 +30,7 @@ def tied(fits: Mapping[int, ServoFit]) -> dict[int, ServoFit]:
     if len(fits) < 2 or not common:
         return dict(fits)
     places = {j: [fit.free.index(name) for name in common] for j, fit in fits.items()}
-    inverses = {j: left_out(fit.found, fit.loop, 3 * fit.scale, 1).inverse for j, fit in fits.items()}  # of curvatures
+    inverses = {j: cross_validate(fit.found, fit.loop, 3 * fit.scale, 1).inverse for j, fit in fits.items()}  # of curvatures
     M = {j: np.linalg.pinv(_part(inverses[j], places[j]), hermitian=True) / fit.scale**2 for j, fit in fits.items()}
     C = {j: _part(fit.covariance, places[j]) for j, fit in fits.items()}
     own = {j: np.array([fit.p[name] for name in common]) for j, fit in fits.items()}
@@ -47,18 +47,18 @@ def _part(C: Array, places: list[int]) -> Array:
 
 
 def _spread(c: Array, own: Mapping[int, Array], C: Mapping[int, Array]) -> float:
-    """Return Birge's ratio: the mean square of differences of each joint from all, in their standard errors, or 1."""
+    """Birge's ratio: the mean square of differences of each joint from all, in their standard errors, or 1."""
     z = np.concatenate([(own[j] - c) / np.sqrt(np.maximum(np.diagonal(C[j]), TINY)) for j in own])
     return max(1.0, float(np.sum(z**2)) / (len(c) * (len(own) - 1)))
 
 
 def _with(fit: ServoFit, shared: Mapping[str, float], places: list[int], S: Array, H: Array) -> ServoFit:
-    """Return the fit of a joint whose motor is known, with the covariance that follows; H: inverse of its curvature."""
+    """Fit of a joint whose motor is known, with the covariance that follows; H: inverse of its curvature."""
     others = [k for k in range(len(fit.free)) if k not in places]
     free = tuple(fit.free[k] for k in others)
     p = {**fit.p, **shared}
     held = {name: x for name, x in p.items() if name not in free}
-    again = Stages(fit.loop.runs, held, p, cut=False).last(fit.friction, free, p, fit.contrasts)
+    again = Stages(fit.loop.runs, held, p, cut=False).fit_fine(fit.friction, free, p, fit.contrasts)
     follow = H[np.ix_(others, places)] @ np.linalg.pinv(
         _part(H, places), hermitian=True
     )  # how parameters of the joint follow its motor's

@@ -1,6 +1,6 @@
 """Torques that make a robot move along given states: MuJoCo's inverse dynamics, and a friction law."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 import numpy.typing as npt
@@ -62,8 +62,21 @@ class InverseDynamics:
 
 def inverse_dynamics(robot: Robot, q: Array, qd: Array, qdd: Array) -> Array:
     """Return the torques [N m] along a motion, as `InverseDynamics`; all arrays have the shape (time, joint)."""
-    blocks = [slice(i, i + BLOCK) for i in range(0, len(q), BLOCK)]
-    return np.concatenate([InverseDynamics(robot, len(q[b]))(q[b], qd[b], qdd[b]) for b in blocks])
+    return np.concatenate([tau for _, tau in _blocks(robot, q, qd, qdd)])
+
+
+def mass_matrices(robot: Robot, q: Array, qd: Array, qdd: Array) -> tuple[Array, Array]:
+    """Mass matrices along a motion [kg m^2], shape (time, joint, joint), and its torques, shape (time, joint)."""
+    M, tau = zip(*_blocks(robot, q, qd, qdd), strict=True)
+    return np.concatenate(M), np.concatenate(tau)
+
+
+def _blocks(robot: Robot, q: Array, qd: Array, qdd: Array) -> Iterator[tuple[Array, Array]]:
+    """Yield mass matrices and torques of so many states at a time."""
+    for b in (slice(i, i + BLOCK) for i in range(0, len(q), BLOCK)):
+        dynamics = InverseDynamics(robot, len(q[b]))
+        tau = dynamics(q[b], qd[b], qdd[b])
+        yield dynamics.mass_matrix, tau
 
 
 def coulomb_torque(robot: Robot, qd: Array) -> Array:

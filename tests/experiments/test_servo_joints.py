@@ -7,12 +7,15 @@ import numpy as np
 import pytest
 
 from idbench.experiments.servo import joints as module
+from idbench.experiments.servo.identification import summary_of
 from idbench.experiments.servo.joints import Joints, JointsLog
+from idbench.experiments.servo.servo_text import value_of
 from idbench.experiments.study.servo_rows import _joints
 from idbench.identify import IdentificationError
 from idbench.identify.files.servo_log import ServoColumns
 from idbench.identify.servo import Servo, identify_again, identify_servo
 from idbench.identify.servo.identification import APART, per_offset
+from idbench.identify.servo.mistakes import mistake_of
 from idbench.identify.servo.stages import searched_runs
 from idbench.sim.engine.simulation import simulate
 from idbench.sim.robot.mounting import PLAIN
@@ -41,8 +44,8 @@ def fit_of(joint):
     """Return what stands for a fit: it simulates the joint as it was measured, with a jolt that was not seen."""
     jolt = np.where(np.arange(200) == 100, 1e-3, 0.0)
     return Fake(
-        name=joint, p={"offset": 0.0, "Ia": 0.01}, taken_late=0.0,
-        scaled=False, explained=True, errors=lambda runs: np.zeros(1), of_all=None,
+        name=joint, p={"Ia": 0.01}, taken_late=0.0,
+        offset=0.0, scaled=False, explained=True, errors=lambda runs: np.zeros(1), of_all=None,
         fine=lambda run: (run.t, run.q + jolt), covariance=np.eye(1), free=("offset",), servo=SERVO,
     )  # fmt: skip
 
@@ -135,3 +138,16 @@ def test_offsets_are_what_gravity_says_of_all_joints_and_their_changes_what_anot
     )
     slope = per_offset(one, *(searched_runs(x, elbow.p["delay"]) for x in (now[2], shifted[2])))[place]
     assert again.p["offset"] - one.p["offset"] == pytest.approx(0.03 * slope, rel=0.2)
+
+
+@pytest.mark.thorough
+def test_a_joint_whose_load_sets_no_scale_has_neither_gain_nor_offset():
+    """The gripper, which nearly nothing pulls: 2.97 times the true gain fitted better (p = 8e-6), and an offset of 0.4 rad."""
+    scenario = load("servo-arm")
+    joints = _joints(scenario, simulate(scenario).alone())
+    fit = dict(joints.identified(lambda j, runs: identify_servo(runs, "coulomb")))[5]
+    assert not fit.scaled
+    assert fit.p["offset"] != 0 == fit.offset
+    assert summary_of(fit)["offset"]["value"] is None
+    assert value_of(fit, "offset") == "no scale"
+    assert mistake_of(fit) is None

@@ -6,8 +6,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from idbench.identify.servo import ServoFit
+from idbench.identify.servo import JointLoad, Servo, ServoFit, ServoRun
+from idbench.identify.servo.closed_loop import ServoLoop
 from idbench.identify.servo.identification import OffsetJoint, together
+from idbench.identify.servo.parameters import SERVO_PARAMETERS
 from idbench.identify.servo.search import Found
 
 RNG = np.random.default_rng(0)
@@ -18,7 +20,9 @@ PLACE = FREE.index("offset")
 def fit_of(covariance, free=FREE):
     p = dict(zip(FREE, [10.0, 0.0, 0.0] + 0.2 * RNG.normal(size=3), strict=True))  # far from all limits
     found = Found(p, 0.0, None, None, None, None)
-    loop = SimpleNamespace(limits=lambda limits, free: limits)
+    loop = SimpleNamespace(
+        limits=lambda names: np.array([[SERVO_PARAMETERS[x].low, SERVO_PARAMETERS[x].high] for x in names]).T
+    )
     return ServoFit("coulomb", free, found, loop, None, (np.inf, np.inf), covariance)
 
 
@@ -97,3 +101,28 @@ def test_parameters_stay_within_their_limits():
         {0: OffsetJoint(one, {1: np.array([-1e3, 0.0, 0.0])}), 1: OffsetJoint(other, {})}, {1: other.p["offset"] - 0.5}
     )
     assert found[0].p["a"] == 0
+
+
+def test_offsets_that_agree_stay_within_the_range_of_the_joint():
+    """Its encoder spans 2 rad of a range of 2.2 rad: an offset of more than 0.1 rad is beyond a stop."""
+    t = np.arange(100) / 100
+    q = np.cos(2 * np.pi * t)
+    run = ServoRun(t, q, q, JointLoad.pendulum(0.5, 0.1), Servo(), range=(-1.1, 1.1))
+    one, other = replace(fit_of(covariance()), loop=ServoLoop([run], 1e-3)), fit_of(covariance())
+    pair = {0: OffsetJoint(one, {1: np.array([0.0, 1.0, 0.0])}), 1: OffsetJoint(other, {})}
+    for way in (-5.0, 5.0):
+        found = together(pair, {1: other.p["offset"] - way})
+        assert found[0].p["offset"] == pytest.approx(0.1 * np.sign(way))
+
+
+def test_an_offset_follows_from_gravity_and_is_none_where_torques_have_no_scale():
+    """Unless it is held."""
+    one = fit_of(covariance())
+    found = replace(one.found, residual=RNG.normal(size=(1, 100)))
+    loop, shown = SimpleNamespace(runs=[None], samples=100), SimpleNamespace(loaded=True)
+    scaled, fit = (replace(one, found=found, loop=loop, excitation=shown, contrasts=(x, x)) for x in (np.inf, 1.0))
+    assert scaled.offset == one.p["offset"] != 0
+    assert scaled.unscaled == set()
+    assert fit.offset == 0
+    assert fit.unscaled == {"a", "offset"}
+    assert replace(fit, free=("a", "lead")).offset == one.p["offset"]

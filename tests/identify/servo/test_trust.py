@@ -8,7 +8,7 @@ import pytest
 from idbench.identify.servo import SERVO_FRICTIONS, JointLoad, Servo, ServoRun, identify_again, identify_servo
 from idbench.identify.servo.choice import choose_friction, residuals_by_state
 from idbench.identify.servo.closed_loop import ServoLoop, count_of
-from idbench.identify.servo.mistakes import mistake_of
+from idbench.identify.servo.mistakes import MISTAKES, mistake_of
 from idbench.identify.servo.search import ServoSearch
 
 SERVO = Servo(0.166, 16.0, supply=12.0, limit=0.97, counts=4096)
@@ -77,6 +77,13 @@ def test_the_law_that_the_log_needs_is_chosen(law, expected):
     choice = choose_friction([simulated(1, **law)])
     assert choice.chosen in expected
     assert set(choice.fits) == set(SERVO_FRICTIONS)
+
+
+@pytest.mark.thorough
+def test_a_law_that_is_compared_is_fitted_as_if_it_were_asked_for(run):
+    """With a further parameter each law begins at the simpler one, whoever asks."""
+    choice = choose_friction([run], ("lead",))
+    assert choice.fits["load"].p == identify_servo([run], "load", ("lead",)).p
 
 
 @pytest.mark.thorough
@@ -181,7 +188,7 @@ def test_where_no_parameter_has_an_effect_no_other_valley_is_tried(fit):
     search = ServoSearch(fit.loop, fit.free, fit.excitation.scales, fit.scale)
     nothing = replace(fit.found.beginnings, K=np.zeros_like(fit.found.beginnings.K))
     still = replace(fit.found, sensitivity=np.zeros_like(fit.found.sensitivity), beginnings=nothing)
-    assert search.away(still) == [fit.p]
+    assert search.axis_points(still) == [fit.p]
 
 
 WRONG = {
@@ -198,9 +205,9 @@ def test_a_mistake_is_named_with_its_size(letter):
     spoil, size = WRONG[letter]
     found = mistake_of(identify_servo([spoil(simulated(0))], "coulomb"))
     assert found is not None
-    assert found.letter == letter
-    assert found.size == pytest.approx(size, rel=0.05)
-    assert found.errors[1] < 0.2 * found.errors[0]
+    assert found.cause == MISTAKES[letter]
+    assert found.size[0] == pytest.approx(size, rel=0.05)
+    assert found.held_out[1] < 0.2 * found.held_out[0]
 
 
 @pytest.mark.thorough
