@@ -11,10 +11,10 @@ import numpy.typing as npt
 from idbench.identify.arrays import Array
 from idbench.identify.basis.basis import Basis
 from idbench.identify.estimators.problem import Problem
+from idbench.identify.iterate import minimum
 from idbench.identify.judge.fitted_motion import on_tree, tree_of, with_first_link_moments
 from idbench.identify.judge.stretches import held_out_errors
 from idbench.identify.judge.suspect import Suspect
-from idbench.identify.minimum import minimum
 from idbench.identify.rows.factors import CONVERGED
 
 POOR = 5.0
