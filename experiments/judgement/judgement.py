@@ -82,7 +82,7 @@ def judge(result: Fit) -> Judgement:
 def _judged(title: str, make: Callable[[], HeldOut]) -> HeldOut | Unjudged:
     try:
         made = make()
-        _ = made.summary()  # torques, the simulated robot, verdicts: whoever shows them later finds them made
+        made.summary()  # torques, the simulated robot, verdicts: whoever shows them later finds them made
         return made
     except Exception as error:  # one log takes nothing away from the others
         return Unjudged(title, reason(error), "" if is_told(error) else trace(error))

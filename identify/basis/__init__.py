@@ -12,6 +12,7 @@ from idbench.identify.basis.friction.laws import AsymmetricViscousFriction as As
 from idbench.identify.basis.friction.laws import Cogging as Cogging
 from idbench.identify.basis.friction.laws import CoulombFriction as CoulombFriction
 from idbench.identify.basis.friction.laws import Offset as Offset
+from idbench.identify.basis.friction.laws import SmoothFriction as SmoothFriction
 from idbench.identify.basis.friction.laws import TanhFriction as TanhFriction
 from idbench.identify.basis.friction.laws import TemperatureFriction as TemperatureFriction
 from idbench.identify.basis.friction.laws import ViscousFriction as ViscousFriction
@@ -22,7 +23,6 @@ from idbench.identify.basis.friction.shape import Shape as Shape
 from idbench.identify.basis.friction.shape import ShapedFriction as ShapedFriction
 from idbench.identify.basis.friction.shape import StribeckFriction as StribeckFriction
 from idbench.identify.basis.friction.shape import free_stribeck, power, stribeck
-from idbench.identify.basis.friction.smooth import SmoothFriction as SmoothFriction
 from idbench.identify.basis.joint_law import AbstractFriction as AbstractFriction
 from idbench.identify.basis.joint_law import AbstractJointLaw as AbstractJointLaw
 from idbench.identify.basis.joint_law import Armature as Armature

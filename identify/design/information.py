@@ -13,8 +13,7 @@ from idbench.identify.basis.block import FRICTION
 from idbench.identify.data.motion_log import MotionLog
 from idbench.identify.models import ExplicitModel
 from idbench.identify.noise.linearization import Linearization, observation
-from idbench.identify.noise.noisy_rows import NoisyRows
-from idbench.identify.noise.propagation import NoiseLevels
+from idbench.identify.noise.propagation import NoiseLevels, NoisyRows
 from idbench.identify.rows.chain import Chain
 from idbench.identify.signals.signals import State
 

@@ -21,10 +21,10 @@ from idbench.identify.estimators.likelihood.maximum_likelihood import (
 )
 from idbench.identify.estimators.likelihood.maximum_likelihood import with_delay, with_reversals
 from idbench.identify.estimators.problem import Problem as Problem
-from idbench.identify.estimators.simulating.closed_loop_errors import ClosedLoopInputError as ClosedLoopInputError
-from idbench.identify.estimators.simulating.closed_loop_errors import ClosedLoopOutputError as ClosedLoopOutputError
-from idbench.identify.estimators.simulating.instrumental_variables import DirectInverse as DirectInverse
-from idbench.identify.estimators.simulating.instrumental_variables import InstrumentalVariables as InstrumentalVariables
+from idbench.identify.estimators.simulating.closed_loops import ClosedLoopInputError as ClosedLoopInputError
+from idbench.identify.estimators.simulating.closed_loops import ClosedLoopOutputError as ClosedLoopOutputError
+from idbench.identify.estimators.simulating.closed_loops import DirectInverse as DirectInverse
+from idbench.identify.estimators.simulating.closed_loops import InstrumentalVariables as InstrumentalVariables
 from idbench.identify.estimators.simulating.output_error import OutputError as OutputError
 from idbench.identify.plugins import PluginTable
 

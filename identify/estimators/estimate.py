@@ -10,10 +10,9 @@ import numpy.typing as npt
 
 from idbench.identify.arrays import Array, frozen
 from idbench.identify.errors import PluginError
-from idbench.identify.estimators.between_logs import BetweenLogs, between_logs
+from idbench.identify.estimators.leave_out import BetweenLogs, ModelError, between_logs
 from idbench.identify.estimators.likelihood.joint_fit import JointFit
 from idbench.identify.estimators.log_rows import bias_covariance, delay_covariance, noise_covariance
-from idbench.identify.estimators.model_error import ModelError
 from idbench.identify.estimators.problem import Problem
 from idbench.identify.estimators.solution import AbstractSolution, Given, OfWeightedRows, OfWhitenedRows
 from idbench.identify.noise.propagation import NoiseLevels

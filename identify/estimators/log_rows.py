@@ -12,7 +12,7 @@ from idbench.identify.data.motion_log import MotionLog, TorqueChannel
 from idbench.identify.models import torque_rows
 from idbench.identify.noise.covariance import BandedCovariance, Whitening
 from idbench.identify.noise.linearization import Linearization
-from idbench.identify.noise.noisy_rows import NoisyRows
+from idbench.identify.noise.propagation import NoisyRows
 from idbench.identify.noise.row_weights import friction_bias, reciprocal_root, unbiased, with_more_noise
 from idbench.identify.rows.chain import Chain
 from idbench.identify.rows.factors import Factor, triangular

@@ -16,6 +16,7 @@ from idbench.identify.basis.friction.shape import ShapedFriction, with_settings
 from idbench.identify.basis.joint_law import AbstractFriction, AbstractJointLaw
 from idbench.identify.basis.of_joints import OfJoints
 from idbench.identify.estimators.problem import Problem
+from idbench.identify.iterate import iterate
 from idbench.identify.rows.factors import Factors, Status, triangular
 from idbench.identify.rows.rows import Rows
 from idbench.identify.signals.signals import State
@@ -51,16 +52,15 @@ def settled(problem: Problem) -> Problem:
 
 def _settled(rows: "AdaptiveRows", here: Basis) -> Basis:
     """Return the basis at its own estimate, near where it begins: b(k+1) = b(X(k)), X(k) = argmin |w (Y - W(b(k)) X)|."""
-    there, cost = rows.factors(here), rows.misfit(here)
-    for _ in range(ROUNDS):
+
+    def step(now: tuple[Basis, Factors, Array]) -> tuple[tuple[Basis, Factors, Array], bool]:
+        here, there, cost = now
         X = _estimate(there, here)
         ahead, cost = _step(rows, here, X, cost)
         moved = rows.factors(ahead)
-        step = np.abs(moved.fit(2).X - X) / _sigma(there)
-        here, there = ahead, moved
-        if not (step > SETTLED).any():
-            break
-    return here
+        return (ahead, moved, cost), not (np.abs(moved.fit(2).X - X) / _sigma(there) > SETTLED).any()
+
+    return iterate(step, (here, rows.factors(here), rows.misfit(here)), ROUNDS)[0][0]
 
 
 def _estimate(factors: Factors, basis: Basis) -> Array:

@@ -10,10 +10,10 @@ from idbench.identify.arrays import Array
 from idbench.identify.basis.basis import Basis
 from idbench.identify.data.motion_log import MotionLog, TorqueChannel
 from idbench.identify.errors import ExcitationError, LogError, RangeError, SettingError
-from idbench.identify.estimators.between_logs import scatter
+from idbench.identify.estimators.leave_out import scatter
 from idbench.identify.estimators.problem import Problem
-from idbench.identify.judge.delay_step import delay_step, newton
-from idbench.identify.minimum import minimum
+from idbench.identify.iterate import minimum, not_converged
+from idbench.identify.judge.delay_step import ROUNDS, SETTLED, delay_step, newton
 from idbench.identify.models import ExplicitModel
 from idbench.identify.rows.chain import Chain, idbench_chain
 from idbench.identify.rows.rows import Rows, manageable
@@ -141,7 +141,7 @@ def estimate_joint_delays(
     Raises
     ------
     RangeError
-        If the delays do not settle.
+        If the delays do not converge.
     """
     common = estimate_delay(log, basis, chain, within)
     logs = manageable([log] if isinstance(log, MotionLog) else list(log))
@@ -156,16 +156,15 @@ def estimate_joint_delays(
         mean = float(delays.mean())
         return DelayEstimate(mean, 0.0, tuple((delays - mean).tolist()))
 
-    delays, sigma, settled = newton(
+    delays, sigma, move = newton(
         lambda delays: _delayed(problem, of(delays)),
         np.full(basis.n, common.delay),
         lambda each: [np.stack(part.delay_slopes(each=True), axis=-1) for part in each.parts],
     )
-    if settled:
+    if move <= SETTLED:
         return replace(of(delays), sigma=tuple(sigma.tolist()))
-    raise RangeError(
-        "the delays of the joints do not converge: does the model fit the robot? `estimate` finds one delay for all joints"
-    )
+    advice = "does the model fit the robot? `estimate` finds one delay for all joints"
+    raise RangeError(not_converged("the delays of the joints", move, ROUNDS, advice))
 
 
 def _without_hidden(basis: Basis, error: ExcitationError) -> Basis:
@@ -242,10 +241,10 @@ class _Search:
 
         Steps leave it where the model is far off.
         """
-        found, sigma, settled = newton(
+        found, sigma, move = newton(
             lambda delay: replace(self._problem, logs=self._delayed(float(delay[0]))), np.array([delay]), _slopes, within
         )
-        if not settled:
+        if move > SETTLED:
             return DelayEstimate(delay, float(sigma[0]))
         estimate = DelayEstimate(float(found[0]), float(sigma[0]))
         return estimate if len(self._logs) == 1 else _with_scatter(_delayed(self._problem, estimate), estimate)

@@ -5,9 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from idbench.identify.arrays import Array
+from idbench.identify.arrays import TINY, Array
 from idbench.identify.estimators.leave_out import Stretches, jackknife, left_out
 from idbench.identify.estimators.problem import Problem
+from idbench.identify.iterate import iterate
 
 ROUNDS, SETTLED = 10, 0.1  # Steps at most, and share of a sigma below which the last one must be: 1 % of sigma^2
 
@@ -38,20 +39,26 @@ def newton(
     delays: Array,
     slopes: Callable[[Problem], list[Array]],
     within: tuple[float, float] = (-np.inf, np.inf),
-) -> tuple[Array, Array, bool]:
-    """Delays after Newton steps, delta(k+1) = delta(k) + step, their standard errors, and whether the last step was small.
+) -> tuple[Array, Array, float]:
+    """Delays after Newton steps, delta(k+1) = delta(k) + step, their standard errors, and the last step over these.
 
-    None goes beyond a range.
+    None goes beyond a range: a step that would counts as infinite.
     """
-    for _ in range(ROUNDS):
+    sigma: Array
+    move: float
+
+    def ahead(delays: Array) -> tuple[Array, bool]:
+        nonlocal sigma, move
         problem = delayed(delays)
         step, sigma = delay_step(problem, slopes(problem))
         if not ((within[0] <= delays + step) & (delays + step <= within[1])).all():
-            return delays, sigma, False
-        delays = delays + step
-        if (np.abs(step) <= SETTLED * sigma).all():
-            return delays, sigma, True
-    return delays, sigma, False
+            move = np.inf
+            return delays, True
+        move = float(np.max(np.abs(step) / np.maximum(sigma, TINY)))
+        return delays + step, move <= SETTLED
+
+    delays, _ = iterate(ahead, delays, ROUNDS)
+    return delays, sigma, move
 
 
 def torque_lateness(problem: Problem, j: int, late: float) -> float:

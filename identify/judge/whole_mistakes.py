@@ -11,6 +11,7 @@ import numpy.typing as npt
 from idbench.identify.arrays import TINY, Array
 from idbench.identify.basis.basis import Basis
 from idbench.identify.estimators.problem import Problem
+from idbench.identify.iterate import minimum
 from idbench.identify.judge.fitted_motion import on_tree, tree_of, with_first_link_moments
 from idbench.identify.judge.mistake_columns import rotation
 from idbench.identify.judge.mistake_rows import MistakeRows
@@ -18,7 +19,6 @@ from idbench.identify.judge.mistakes import TILT
 from idbench.identify.judge.stretches import held_out_errors, left_unexplained, noise_errors
 from idbench.identify.judge.suspect import Suspect
 from idbench.identify.judge.torque_gains import DECISIVE, TorqueGains
-from idbench.identify.minimum import minimum
 from idbench.identify.rows.factors import CONVERGED
 
 POOR = 5.0

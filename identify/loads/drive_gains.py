@@ -12,6 +12,7 @@ from idbench.identify.errors import IdentificationError, SettingError
 from idbench.identify.estimators.estimate import Estimate
 from idbench.identify.estimators.problem import Problem
 from idbench.identify.estimators.settle import settled
+from idbench.identify.iterate import iterate, not_converged
 from idbench.identify.loads.loaded_robot import LoadedRobot
 from idbench.identify.models import ExplicitModel
 
@@ -63,9 +64,12 @@ def identify_drive_gains(robot: LoadedRobot) -> GainEstimate:
         raise SettingError("nothing is known of the payload: the gains need its mass at least")
     if not robot.without:
         raise SettingError("there is no log without the payload: the robot's own mass cannot be distinguished from the gains")
-    n, ratio = robot.tree.n, np.ones(robot.tree.n)
-    basis = robot.basis
-    for _ in range(ROUNDS):
+    n, basis = robot.tree.n, robot.basis
+    with_gains: Problem
+    off: Array
+
+    def step(ratio: Array) -> tuple[Array, bool]:
+        nonlocal basis, with_gains, off
         logs = tuple(read_with(log, ratio) for log in robot.of_both)
         problem = settled(Problem(logs, basis, ExplicitModel(), robot.chain))
         basis = problem.basis
@@ -73,17 +77,18 @@ def identify_drive_gains(robot: LoadedRobot) -> GainEstimate:
         with_gains = problem.with_basis((basis + DriveGains()).linearized_at(start))
         with_gains.factors.together.check()
         found = with_gains.factors.fit(2)
-        step = found.X[-n:]
+        gains = found.X[-n:]
         sigma = np.sqrt(np.diagonal(found.factor.inverse(np.array(True))))[-n:]
-        if (np.abs(step - 1) < SETTLED * sigma).all():
-            break
-        _require_sign(robot, step, sigma, problem)
-        ratio = ratio * np.clip(step, 1 / FACTOR, FACTOR)
-    else:
-        raise IdentificationError(
-            f"the gains of {', '.join(_names(robot, np.abs(step - 1) > sigma))} do not converge: move them more, with a "
-            "heavier payload"
-        )
+        off = np.abs(gains - 1) / sigma
+        if (off < SETTLED).all():
+            return ratio, True
+        _require_sign(robot, gains, sigma, problem)
+        return ratio * np.clip(gains, 1 / FACTOR, FACTOR), False
+
+    ratio, converged = iterate(step, np.ones(n), ROUNDS)
+    if not converged:
+        which = f"the gains of {', '.join(_names(robot, off > 1))}"
+        raise IdentificationError(not_converged(which, float(off.max()), ROUNDS, "move them more, with a heavier payload"))
     final = robot.estimator.fit(with_gains)
     gains = final.X[-n:] * ratio * np.broadcast_to(robot.loaded[0].torque.gain, (n,))
     relative = final.standard_errors[-n:] / final.X[-n:]

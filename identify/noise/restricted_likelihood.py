@@ -6,15 +6,16 @@ find variances that are too small, by half in a joint with twice as many rows as
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import count
 from typing import Self
 
 import numpy as np
 import numpy.typing as npt
 
 from idbench.identify.arrays import Array
+from idbench.identify.iterate import by_run, iterate
 from idbench.identify.noise.band_matrix import BandMatrix, Cholesky
-from idbench.identify.noise.noisy_rows import NoisyRows
-from idbench.identify.noise.propagation import NoiseLevels
+from idbench.identify.noise.propagation import NoiseLevels, NoisyRows
 from idbench.identify.noise.white_noise import EXACT
 from idbench.identify.rows.factors import Factor, triangular
 from idbench.identify.rows.rows import Rows
@@ -86,17 +87,15 @@ def likely(
         Numbers of the C_i after those, which stay.
     """
     held = np.zeros((*start.shape[:-1], 0)) if held is None else held
-    squares = np.maximum(start, least)
-    settled = np.zeros(squares.shape[:-1], dtype=bool)
-    for k in range(ROUNDS):
+    number = count()
+
+    def step(squares: Array) -> tuple[Array, npt.NDArray[np.bool_]]:
         slope = _Slope.at(units, joined, squares, held)
-        moved = np.maximum(squares * (slope.ratio**HASTE if k < HASTY else slope.newton(squares, least)), least)
-        moved = np.where(settled[..., None], squares, moved)
-        settled |= slope.small(squares, moved)  # each run by itself, as if it were alone
-        squares = moved
-        if settled.all():
-            break
-    return squares
+        factors = slope.ratio**HASTE if next(number) < HASTY else slope.newton(squares, least)
+        moved = np.maximum(squares * factors, least)
+        return moved, slope.small(squares, moved)
+
+    return iterate(step, np.maximum(start, least), ROUNDS, keep=by_run)[0]
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,7 @@ import scipy
 from idbench.identify.arrays import Array
 from idbench.identify.data.jumps import ORDER, encoder_steps
 from idbench.identify.data.motion_log import MotionLog
-from idbench.identify.noise.noisy_rows import NoisyRows
+from idbench.identify.noise.propagation import NoisyRows
 from idbench.identify.rows.factors import Factors
 from idbench.identify.rows.rows import Rows
 from idbench.identify.signals.filters import slide

@@ -9,6 +9,7 @@ from idbench.identify.arrays import Array
 from idbench.identify.basis.block import NOT_NEGATIVE, Parameter
 from idbench.identify.data.kinematics import INERTIAL
 from idbench.identify.errors import IdentificationError
+from idbench.identify.iterate import iterate
 
 
 def _pseudo_inertia(values: Sequence[float]) -> Array:
@@ -205,24 +206,25 @@ def _centred(A: Array, b: Array, bodies: Bodies, weight: float, x: Array, close:
         found = bodies.divergence(x)
         return None if found is None else (float(np.sum((A @ x - b) ** 2)) / 2 + weight * found.value, found)
 
-    now = at(x)
-    for _ in range(STEPS):
-        assert now is not None
-        value, d = now
+    def newton(here: tuple[Array, tuple[float, Divergence]]) -> tuple[tuple[Array, tuple[float, Divergence]], bool]:
+        x, (value, d) = here
         U, S, V = np.linalg.svd(A @ d.root)
         S = np.pad(S, (0, len(V) - len(S)))
         slope = S * np.pad(U.T @ (b - A @ x), (0, max(0, len(V) - len(U))))[: len(V)] - weight * (V @ (d.root.T @ d.gradient))
         step = d.root @ (V.T @ (slope / (S**2 + weight)))
         decrement = float(np.sum(slope**2 / (S**2 + weight)))
         if decrement <= close * weight:
-            break
+            return here, True
         t = min(1.0, SHARE * bodies.room(x, step))
         while (new := at(x + t * step)) is None or new[0] > value - 1e-4 * t * decrement + ROUNDING * value:
             t /= 2
             if t < LEAST_STEP:
-                return x
-        x, now = x + t * step, new
-    return x
+                return here, True
+        return (x + t * step, new), False
+
+    begin = at(x)
+    assert begin is not None
+    return iterate(newton, (x, begin), STEPS)[0][0]
 
 
 def _thick(S: Array, number: int) -> Array:

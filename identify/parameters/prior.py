@@ -8,6 +8,7 @@ import numpy.typing as npt
 
 from idbench.identify.arrays import TINY, Array
 from idbench.identify.basis.block import BODY, Parameter
+from idbench.identify.iterate import iterate
 from idbench.identify.parameters.bodies import Bodies, nearest
 from idbench.identify.rows.factors import Prior, triangular
 
@@ -113,7 +114,8 @@ def evident_sizes(R: Array, groups: Sequence[npt.NDArray[np.intp]], sizes: Array
         Where the search begins: what a group would be if it made the whole.
     """
     least, member = LEAST * sizes, np.repeat(np.arange(len(groups)), [len(group) for group in groups])
-    for _ in range(ROUNDS):
+
+    def step(sizes: Array) -> tuple[Array, np.bool_]:
         rows = np.zeros((len(member), R.shape[-1]))
         rows[np.arange(len(member)), np.concatenate(groups)] = 1 / sizes[member]
         whole = triangular(np.concatenate([R, rows]))
@@ -122,11 +124,9 @@ def evident_sizes(R: Array, groups: Sequence[npt.NDArray[np.intp]], sizes: Array
         decided = [max(len(k) - float(variance[k].sum()) / s**2, DECIDED) for k, s in zip(groups, sizes, strict=True)]
         found = np.sqrt([np.sum(X[k] ** 2) / count for k, count in zip(groups, decided, strict=True)])
         found = np.maximum(found, least)
-        done = (np.abs(np.log(found / sizes)) < CLOSE).all()
-        sizes = found
-        if done:
-            break
-    return sizes
+        return found, (np.abs(np.log(found / sizes)) < CLOSE).all()
+
+    return iterate(step, sizes, ROUNDS)[0]
 
 
 def prior_sum(parts: Sequence[Prior]) -> Prior:

@@ -78,7 +78,7 @@ class Chain:
         if log.n != basis.n:
             hint = "; its axes are (time, joint), is it transposed?" if log.samples == basis.n else ""
             raise LogError(f"the log has {log.n} joints, the basis {basis.n}{hint}")
-        _ = self._grid_of(signals)  # too short a log is refused before it is differentiated
+        self._grid_of(signals)  # too short a log is refused before it is differentiated
         equations = model.equations(basis, signals)
         return Rows.of(equations, self.map(equations))
 

@@ -22,8 +22,7 @@ from idbench.identify import (
     scara,
 )
 from idbench.identify.noise.band_matrix import BandMatrix, Cholesky
-from idbench.identify.noise.noisy_rows import NoisyRows
-from idbench.identify.noise.propagation import NoiseLevels
+from idbench.identify.noise.propagation import NoiseLevels, NoisyRows
 from idbench.identify.noise.restricted_likelihood import _Slope, likely_levels
 from idbench.identify.noise.row_weights import unbiased, with_more_noise
 from idbench.identify.rows import rows

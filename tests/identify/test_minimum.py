@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize_scalar
 
-from idbench.identify.minimum import minimum
+from idbench.identify.iterate import minimum
 
 FUNCTIONS = {
     "parabola": (lambda x: (x - 0.3) ** 2, -1.0, 2.0),

@@ -7,7 +7,7 @@ import pytest
 import scipy
 
 from idbench.identify import ESTIMATORS, MODELS, MotionLog, Problem, estimate, idbench_chain, identify, scara
-from idbench.identify.estimators.between_logs import between_logs
+from idbench.identify.estimators.leave_out import between_logs
 
 LEVEL = np.array([0.5, 0.025])
 """Of the error of the torques [N m]."""

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 import scipy
 
-from idbench.identify.estimators.simulating.residual_scatter import scatter
-from idbench.identify.estimators.simulating.row_products import Kinds, with_weights
+from idbench.identify.estimators.simulating.row_products import Kinds, scatter, with_weights
 
 
 def test_the_scatter_of_correlated_residuals(rng):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from idbench.identify.estimators.simulating.steps import SecantSteps, largest
+from idbench.identify.estimators.simulating.simulated_rounds import SecantSteps, largest
 
 TRUTH = np.array([1.0, -2.0, 0.5])
 

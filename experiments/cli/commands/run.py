@@ -45,7 +45,7 @@ def run(options: RunCommand) -> None:
         with stages_of(name) as told:
             watch = recording.watch if recording else None
             ran = replace(made, progress=lambda share: told(f"simulating, {share:.0%}", share), watch=watch)
-            _ = ran.fit
+            fit = ran.fit
         _print_run(page, ran, verbose=options.verbose)
         if isinstance(ran.scenario.drive, ServoDrive):
             page.print(Text(_as_servos(ran.scenario, folder.out)), soft_wrap=True)
@@ -53,7 +53,7 @@ def run(options: RunCommand) -> None:
             if recording:
                 attempts.recording(lambda: recording.finish(ran))
                 doubt_window(page, options.inner, recording)
-                if ran.fit.logs.long:
+                if fit.logs.long:
                     page.print("the identification is not recorded: the rows of such a long log are not kept")
 
 

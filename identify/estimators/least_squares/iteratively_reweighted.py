@@ -15,6 +15,7 @@ from idbench.identify.estimators.estimator import AbstractEstimator, Need
 from idbench.identify.estimators.problem import Problem
 from idbench.identify.estimators.simulating.row_products import Kinds, Solved, solve_with, with_weights
 from idbench.identify.estimators.solution import Given
+from idbench.identify.iterate import iterate
 from idbench.identify.noise.white_noise import EXACT
 from idbench.identify.signals.wild_samples import without_wild_samples
 
@@ -55,17 +56,17 @@ class IterativelyReweighted(AbstractEstimator):
         clean = problem.with_logs([_clean(log) for log in problem.logs])
         rows, kinds = clean.rows, Kinds.of_rows(clean)
         Y, W = rows.Y * kinds.own, rows.W * kinds.own[..., None]
-        found = solve_with(kinds, rows.Y, rows.W, rows.W)
-        weights = _Weights.start(kinds, found.residual * kinds.own, self.tuning, _relative(clean, kinds), _least(Y, kinds))
-        active = np.asarray(np.isfinite(found.X).all(axis=-1))
-        for _ in range(self.rounds):
+        begin = solve_with(kinds, rows.Y, rows.W, rows.W)
+        begin = replace(begin, residual=begin.residual * kinds.own)
+        weights = _Weights.start(kinds, begin.residual, self.tuning, _relative(clean, kinds), _least(Y, kinds))
+
+        def step(before: Solved) -> tuple[Solved, npt.NDArray[np.bool_]]:
+            nonlocal weights
+            weights = weights.again(before.residual)
             new = weights.solved(Y, W)
-            step = np.max(np.abs(new.X - found.X) / new.sigma, axis=-1)
-            found = new.where(active, found)
-            active = active & ~(step < SETTLED)
-            if not active.any():
-                break
-            weights = weights.again(new.residual, active)
+            return new, ~(np.max(np.abs(new.X - before.X) / new.sigma, axis=-1) >= SETTLED)  # runs that have none, too
+
+        found, _ = iterate(step, begin, self.rounds, keep=Solved.where)
         G = found.G * kinds.own[..., None]
         return Estimate(clean, frozen(found.X), frozen(found.covariance), Given(G))
 
@@ -95,12 +96,10 @@ class _Weights:
         even = kinds.by_kind(residual) / relative
         scale = np.maximum(_spread(even, seen), least)
         weight = _tukey(even / scale[..., None, :], tuning) * seen
-        return cls(kinds, tuning, np.eye(kinds.count) / scale[..., None, :], weight, relative, least).again(
-            residual, np.array(True)
-        )
+        return cls(kinds, tuning, np.eye(kinds.count) / scale[..., None, :], weight, relative, least)
 
-    def again(self, residual: Array, active: npt.NDArray[np.bool_]) -> Self:
-        """Return the weights of other residuals, in the runs that are active."""
+    def again(self, residual: Array) -> Self:
+        """Return the weights of other residuals."""
         left = self.kinds.by_kind(residual)
         counted = np.where(self._together[..., None], self.weight * left, 0.0)
         number = np.maximum(np.sum(self._together & (self.weight > 0).all(axis=-1), axis=-1), 1)
@@ -112,9 +111,7 @@ class _Weights:
         spread = _spread(white, self._together[..., None] & self._seen)
         root = root / np.maximum(spread, MIN_DEVIATION)[..., None]
         white = replace(self, root=root)._white(left[..., None])[..., 0] / self.relative
-        weight = _tukey(white, self.tuning) * self._seen
-        pick = active[..., None, None]
-        return replace(self, root=np.where(pick, root, self.root), weight=np.where(pick, weight, self.weight))
+        return replace(self, root=root, weight=_tukey(white, self.tuning) * self._seen)
 
     def solved(self, Y: Array, W: Array) -> Solved:
         """Return the solution of rows, its G for the rows as they were."""

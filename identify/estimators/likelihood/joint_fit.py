@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -13,6 +14,7 @@ from idbench.identify.errors import IdentificationError
 from idbench.identify.estimators.likelihood.cells import HELD, Cells
 from idbench.identify.estimators.likelihood.normal_equations import Noise, NormalEquations, Solved, torque_squares
 from idbench.identify.estimators.likelihood.reversals import Turns, stretches
+from idbench.identify.iterate import iterate, not_converged
 from idbench.identify.noise.linearization import friction_jumps, smoothed
 from idbench.identify.noise.propagation import NoiseLevels
 from idbench.identify.signals.masks import ReversalMask
@@ -93,23 +95,20 @@ class JointFit:
         IdentificationError
             If it diverges or does not settle, or the log does not determine the motion.
         """
-        now = self
-        noises = self._noises()
-        sigma = np.full(len(self.unknowns), np.inf)
-        for _ in range(ROUNDS):
-            for _ in range(STEPS):
-                now, moved, taken = now._step(noises)
-                if moved <= NEXT:
-                    break
-            before, wider = now.levels, sigma
-            now, sigma = now._leveled(noises, taken, floor), np.sqrt(np.diag(now.covariance))
-            if moved < NEXT and np.sqrt(np.mean((sigma / wider - 1) ** 2)) < steady:
-                break
-            noises = now._noises()
-        if moved > RESTLESS:
-            raise IdentificationError(f"motion and parameters together do not converge: steps of {moved:.2g} sigma: {CHECK}")
-        same = np.allclose(now.levels.torque, before.torque, rtol=LIKE)
-        return now if same else replace(now, covariance=now._reduced(now._noises())[1])
+
+        def leveled(before: tuple[JointFit, _Moved]) -> tuple[tuple[JointFit, _Moved], bool]:
+            fit, last = before
+            noises = fit._noises()
+            now = iterate(lambda now: now.fit._step(noises), last._replace(fit=fit), STEPS)[0]
+            like = np.sqrt(np.mean((now.sigma / last.sigma - 1) ** 2)) < steady
+            return (now.fit._leveled(noises, now.taken, floor), now), now.move < NEXT and bool(like)
+
+        begin = _Moved(self, np.inf, np.full(len(self.unknowns), np.inf), np.zeros(0))
+        (fit, last), _ = iterate(leveled, (self, begin), ROUNDS, shown=True)
+        if last.move > RESTLESS:
+            raise IdentificationError(not_converged("motion and parameters together", last.move, ROUNDS, CHECK))
+        same = np.allclose(fit.levels.torque, last.fit.levels.torque, rtol=LIKE)
+        return fit if same else replace(fit, covariance=fit._reduced(fit._noises())[1])
 
     def with_reversals(self) -> "JointFit":
         """Return this fit as the start of one that uses friction through reversals."""
@@ -119,11 +118,8 @@ class JointFit:
     def _noises(self) -> list[Noise]:
         return [self.noise(k) for k in range(len(self.logs))]
 
-    def _step(self, noises: list[Noise]) -> tuple["JointFit", float, Array]:
-        """Return the fit after a Gauss-Newton step, how far the parameters moved [sigma], and the residuals that are taken.
-
-        These are the numbers of cells whose mean torques the unknowns explain in any case, shape (2, joint).
-        """
+    def _step(self, noises: list[Noise]) -> tuple["_Moved", bool]:
+        """The fit after a Gauss-Newton step, and whether levels come next."""
         rng, n = np.random.default_rng(0), self.basis.n
         probes = int(np.clip(PROBES / sum(cells.count for cells in self.logs), 1, MOST_PROBES))
         signs = [rng.choice([-1.0, 1.0], (probes, n, cells.count)) for cells in self.logs]
@@ -134,12 +130,14 @@ class JointFit:
         for z, (V, y, L) in zip(self.motions, parts, strict=True):
             dz, _ = scipy.linalg.lapack.dtbtrs(L, y[:, 0] - V[:, : len(dX)] @ dX, uplo="L", trans="T")
             motions.append(z + dz.reshape(z.shape))
-        moved = _sigmas(dX, covariance)
+        sigma = np.sqrt(np.diag(covariance))
+        moved = float(np.max(np.abs(dX) / np.sqrt(np.maximum(np.diag(covariance), TINY))))
         if not np.isfinite(moved) or not all(np.isfinite(z).all() for z in motions):
             raise IdentificationError(f"motion and parameters together diverge: {CHECK}")
         moved_on = replace(self, X=self.X + dX[: len(self.X)], motions=tuple(motions), covariance=covariance)
         ahead = moved_on if self.delay is None else moved_on._delayed(float(dX[-1]))
-        return ahead, moved, np.asarray(taken).reshape(2, n, -1).mean(axis=-1)
+        taken = np.asarray(taken).reshape(2, n, -1).mean(axis=-1)
+        return _Moved(ahead, moved, sigma, taken), moved <= NEXT
 
     def _delayed(self, change: float) -> "JointFit":
         """Return the fit with torques that act so much later [s]; the motion stays where the torques are."""
@@ -212,9 +210,16 @@ class JointFit:
         return parts, np.linalg.pinv(S / np.outer(size, size), hermitian=True) / np.outer(size, size), b
 
 
-def _sigmas(dX: Array, covariance: Array) -> float:
-    """Return the largest change of a parameter, in sigma."""
-    return float(np.max(np.abs(dX) / np.sqrt(np.maximum(np.diag(covariance), TINY))))
+class _Moved(NamedTuple):
+    """A fit after a Gauss-Newton step; its largest change of a parameter, in sigma, and sigma of each.
+
+    `taken` are the numbers of cells whose mean torques the unknowns explain in any case, shape (2, joint).
+    """
+
+    fit: JointFit
+    move: float
+    sigma: Array
+    taken: Array
 
 
 def _begin(cells: Cells) -> Array:

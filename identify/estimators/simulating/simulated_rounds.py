@@ -14,11 +14,10 @@ from idbench.identify.estimators.estimate import Estimate
 from idbench.identify.estimators.estimator import AbstractEstimator
 from idbench.identify.estimators.problem import Problem
 from idbench.identify.estimators.simulating.row_products import Solved
-from idbench.identify.estimators.simulating.steps import SecantSteps, largest
 from idbench.identify.estimators.simulator import AbstractLoop, Simulated
 from idbench.identify.estimators.solution import AbstractSolution
+from idbench.identify.iterate import by_run, iterate, not_converged
 from idbench.identify.models import ExplicitModel
-from idbench.identify.telling import stage
 
 SMALL = 1e-3  # Change of a parameter, as a share of what makes the whole torque of a joint
 
@@ -30,6 +29,48 @@ UNSETTLED = 1.0  # Remaining distance, in sigma, at which an estimate that has n
 MAX_DEVIATION, MAX_FIRST_DEVIATION = 0.1, 0.3
 """Rms by which a simulated motion may differ from the logged one in the end, and in the first round, as a share of the rms of
 the logged motion about its mean."""
+
+
+FARTHEST = 1.0  # Share of the last two answers' difference by which the next round may begin beyond the last answer
+
+
+class SecantSteps:
+    """Rounds that leave a share of what was left, each direction its own.
+
+    How much of its beginning an answer keeps is known along the line through the last two rounds. The next round begins where
+    their steps along it cross zero (D. G. Anderson, "Iterative procedures for nonlinear integral equations", J. ACM 12 (1965)
+    547-560, with a memory of one). Of the rest of a step half is taken to be left, at most.
+    """
+
+    def __init__(self) -> None:
+        self._before: tuple[Array, Array] | None = None
+
+    def taken(self, X: Array, G: Array, unit: Array) -> tuple[Array, Array]:
+        """Return an upper bound of the remaining distance [units], shape (...), and the start of the next step, shape (..., p).
+
+        Parameters
+        ----------
+        X, G : Array, shape (..., p)
+            Parameters before and after the round.
+        unit : Array, shape (..., p)
+            What a step counts in, such as sigma.
+        """
+        before, self._before = self._before, (X, G)
+        step = (G - X) / unit
+        if before is None:
+            return largest(step), G
+        answered = G - before[1]
+        change = (answered - (X - before[0])) / unit
+        square = np.sum(change**2, axis=-1, keepdims=True)
+        c = np.divide(np.sum(change * step, axis=-1, keepdims=True), square, out=np.zeros_like(square), where=square > 0)
+        left = largest(c * answered / unit) + largest(step - c * change)
+        return left, G - np.where(np.abs(c) <= FARTHEST, c, 0.0) * answered
+
+
+def largest(steps: Array) -> Array:
+    """Largest step of a parameter, by size, shape (...)."""
+    found: Array = np.max(np.abs(steps), axis=-1)
+    return found
 
 
 @dataclass(eq=False)
@@ -86,9 +127,10 @@ class Rounds:
         found: Solved | None = None
         move = np.full(X.shape, np.inf)
         left = np.full(X.shape[:-1], np.inf)
-        for number in range(1, self.most + 1):
-            with stage(f"round {number} of at most {self.most}"):
-                new = step(X)
+
+        def round_(X: Array) -> tuple[Array, bool]:
+            nonlocal found, move, left
+            new = step(X)
             self._require_finite(new.X, "the simulated motion does not determine the parameters")
             found = new.where(self.active, found) if found else new
             unit = np.maximum(new.sigma, NOTHING * self._small)
@@ -101,9 +143,9 @@ class Rounds:
             left = np.where(self.active, np.inf if self._informed else now, left)
             self.path.append(found.X)
             self.active &= ~(left < self.settled)
-            X = np.where(self.active[..., None], after, X)
-            if not self.active.any():
-                break
+            return by_run(after, self.active, X), not self.active.any()
+
+        iterate(round_, X, self.most, shown=True)
         self._require_same_motion(MAX_DEVIATION)
         self._require_settled(move, left)
         assert found is not None  # there is a round at least
@@ -113,11 +155,8 @@ class Rounds:
         """Let runs fail that have not converged."""
         for run in map(tuple, np.argwhere(self.active & ~(left < UNSETTLED)).tolist()):
             k = int(np.argmax(move[run]))
-            self.fail(
-                run,
-                f"{self.problem.names[k]} still moves by {move[run][k]:.2g} sigma after {self.most} rounds: does the simulated "
-                "loop have the controller and the motion of the log? If it does, start closer to the true parameters",
-            )
+            advice = "does the simulated loop have the log's controller and motion? If so, start closer to the true parameters"
+            self.fail(run, not_converged(self.problem.names[k], float(move[run][k]), self.most, advice))
 
     def simulated(self, X: Array) -> Simulated:
         """Return the logs of robots with these parameters, shape (..., run, p); those of runs that failed mean nothing.
