@@ -22,13 +22,24 @@ def soft(speed):
     return lambda v, sign: COULOMB * np.tanh(v / speed)
 
 
-def rigid(q, v):
+def rigid(q, v, X=X):
     """Return M11, M12, M22 and the Coriolis torques."""
     ZZR1, _, _, ZZ2, LMX2, LMY2, _, _ = X
-    c, s = np.cos(q[:, 1]), np.sin(q[:, 1])
+    c, s = np.cos(q[..., 1]), np.sin(q[..., 1])
     k, g = LMX2 * c - LMY2 * s, LMX2 * s + LMY2 * c
-    coriolis = np.stack([-g * (2 * v[:, 0] + v[:, 1]) * v[:, 1], g * v[:, 0] ** 2], axis=1)
+    coriolis = np.stack([-g * (2 * v[..., 0] + v[..., 1]) * v[..., 1], g * v[..., 0] ** 2], axis=-1)
     return ZZR1 + ZZ2 + 2 * k, ZZ2 + k, ZZ2 + 0 * k, coriolis
+
+
+def momentum(X, q, v):
+    """Return M(q) v."""
+    M11, M12, M22, _ = rigid(q, v, X)
+    return np.stack([M11 * v[..., 0] + M12 * v[..., 1], M12 * v[..., 0] + M22 * v[..., 1]], axis=-1)
+
+
+def torque(X, q, v, a):
+    """Return the torques of a motion (Eq. 51)."""
+    return momentum(X, q, a) + rigid(q, v, X)[-1] + X[[1, 6]] * v + X[[2, 7]] * np.sign(v)
 
 
 def acceleration(q, v, u, sign, sticks, law):
@@ -62,9 +73,8 @@ def simulated(motion, law=coulomb, static=1.0, jumps=True):
     found = np.zeros((3, *reference.shape))
     for k in range(reference.shape[1]):
         wanted = bend[:, k] + 50 * (rate[:, k] - v) + 625 * (reference[:, k] - q)
-        M11, M12, M22, coriolis = rigid(q, v)
-        u = np.stack([M11 * wanted[:, 0] + M12 * wanted[:, 1], M12 * wanted[:, 0] + M22 * wanted[:, 1]], axis=1)
-        u += coriolis + VISCOUS * v + COULOMB * np.tanh(rate[:, k] / 0.02)
+        u = momentum(X, q, wanted)
+        u += rigid(q, v)[-1] + VISCOUS * v + COULOMB * np.tanh(rate[:, k] / 0.02)
         found[:, :, k] = q, v, u
         for _ in range(STEPS):
             if jumps:
