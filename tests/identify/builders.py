@@ -1,12 +1,17 @@
 """What several files of tests make: noisy logs, robots with their base parameters, columns as matrices and their identities."""
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from idbench.identify import BaseParameters, KinematicTree, MotionLog, State, tree_basis
+from idbench.sim.encoders import IncrementalEncoder
+from idbench.sim.engine.simulation import simulate
 from idbench.sim.robot.robot import Robot
 from idbench.sim.robot.tree import kinematic_tree, standard_parameters
+from idbench.sim.scenario.scenario_file import load
+from idbench.sim.trajectories import RandomMoves
 
 EPS = 1e-30
 
@@ -32,6 +37,16 @@ def noisy(log, position, torque, runs=(), rng=5):
     rng, shape = np.random.default_rng(rng), (*runs, *log.q.shape)
     q = log.q + position * rng.standard_normal(shape) if np.any(position) else np.broadcast_to(log.q, shape)
     return MotionLog(log.fs, q, log.tau + torque * rng.standard_normal(shape), log.torque)
+
+
+MOVES = RandomMoves(moves=12, durations=(1.3, 1.3), rest=0.7, seed=1)
+
+
+def closed(bits, runs=1, **parts):
+    """Return a scenario with an encoder, and the log of its runs."""
+    scenario = replace(load("ideal"), **{"trajectory": MOVES, "encoder": IncrementalEncoder(lines=2 ** (bits - 2)), **parts})
+    log = simulate(scenario, range(runs)).log
+    return scenario, log if runs > 1 else log.run((0,))
 
 
 def dense(C):

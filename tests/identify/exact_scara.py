@@ -111,10 +111,10 @@ def through_events(q, v, u, sign, sticks, law, static):
     return q, v, sign, sticks
 
 
-def series(runs, seconds=26, harmonics=14):
-    """Return random sums of sines, of periods of 2 to 13 s: about 26 reversals of the first joint."""
-    t, rng = np.arange(round(seconds / PERIOD)) * PERIOD, np.random.default_rng(0)
-    w = 2 * np.pi / seconds * np.arange(2, harmonics + 1)
+def series(runs, seconds=26, harmonics=range(2, 15), period=26, seed=0, acceleration=(8, 20)):
+    """Return random sums of sines, by default of periods of 2 to 13 s: about 26 reversals of the first joint."""
+    t, rng = np.arange(round(seconds / PERIOD)) * PERIOD, np.random.default_rng(seed)
+    w = 2 * np.pi / period * np.array(harmonics)
     a, b = rng.standard_normal((2, runs, 2, len(w)))
     sine, cosine = np.sin(w * t[:, None]), np.cos(w * t[:, None])
     q, qd, qdd = (
@@ -122,18 +122,18 @@ def series(runs, seconds=26, harmonics=14):
         for scale, x, y in ((1 / w, sine, -cosine), (np.ones_like(w), cosine, sine), (w, -sine, cosine))
     )
     size = np.minimum(1.5 / np.abs(q).max(axis=1), 3 / np.abs(qd).max(axis=1))
-    size = np.minimum(size, [8, 20] / np.abs(qdd).max(axis=1))[:, None]
+    size = np.minimum(size, np.array(acceleration) / np.abs(qdd).max(axis=1))[:, None]
     return size * q, size * qd, size * qdd
 
 
-def moves(runs, seconds=26):
+def moves(runs, seconds=26, durations=(0.8, 1.3), begin=0.3, seed=0):
     """Return random fifth-order moves with rests."""
-    t, rng = np.arange(round(seconds / PERIOD)) * PERIOD, np.random.default_rng(0)
+    t, rng = np.arange(round(seconds / PERIOD)) * PERIOD, np.random.default_rng(seed)
     found = np.zeros((3, runs, len(t), 2))
     for run, joint in np.ndindex(runs, 2):
-        start, here = 0.3, 0.0
+        start, here = begin, 0.0
         while start < seconds:
-            duration, there = rng.uniform(0.8, 1.3), rng.uniform(-1.5, 1.5)
+            duration, there = rng.uniform(*durations), rng.uniform(-1.5, 1.5)
             inside, s = (start <= t) & (start + duration > t), np.clip((t - start) / duration, 0, 1)
             found[0, run, t >= start, joint] = (here + (there - here) * (10 * s**3 - 15 * s**4 + 6 * s**5))[t >= start]
             found[1, run, inside, joint] = ((there - here) * 30 * (s - s**2) ** 2 / duration)[inside]

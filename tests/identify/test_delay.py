@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from builders import noisy
 
 from idbench.identify import (
     ESTIMATORS,
@@ -97,8 +98,7 @@ def test_a_known_delay_is_found_with_16_bits(delay, seed):
 @pytest.mark.thorough
 def test_its_sigma_is_its_scatter():
     """Twelve realizations of torque noise: the jackknife says the scatter, known to a fifth, to a factor of two."""
-    noisy = replace(load("ideal"), torque=TorqueMeasurement(noise=(0.5, 0.05)))
-    run = simulate(noisy, range(12))
+    run = simulate(replace(load("ideal"), torque=TorqueMeasurement(noise=(0.5, 0.05))), range(12))
     logs = [MotionLog(100.0, run.log.q[i], run.log.tau[i], TorqueChannel("held")) for i in range(12)]
     found = [estimate_delay(log, scara()) for log in logs]
     scatter = np.std([one.delay for one in found], ddof=1)
@@ -136,12 +136,11 @@ def test_standard_errors_contain_that_of_the_delay(log, rng, model):
 
     Of least squares, whose weights do not depend on the delay.
     """
-    noisy = MotionLog(log.fs, log.q, log.tau + [0.05, 0.0025] * rng.standard_normal(log.tau.shape), TorqueChannel("held"))
+    drawn = noisy(log, 0, [0.05, 0.0025], rng=rng)
 
     def fit(delay, sigma=0.0):
-        torque = TorqueChannel("held", delay, delay_sigma=sigma)
-        chosen = MODELS.create(model), ESTIMATORS.create("OLS")
-        return identify(replace(noisy, torque=torque), scara(), chosen[0], idbench_chain(), chosen[1])
+        late = replace(drawn, torque=TorqueChannel("held", delay, delay_sigma=sigma))
+        return identify(late, scara(), MODELS.create(model), estimator=ESTIMATORS.create("OLS"))
 
     plain, known = fit(0.001), fit(0.001, 5e-4)
     moved = (fit(0.0011).X - fit(0.0009).X) / 2e-4
