@@ -3,6 +3,7 @@
 from dataclasses import replace
 from typing import NamedTuple
 
+import mujoco
 import numpy as np
 
 from idbench.identify import BaseParameters, KinematicTree, MotionLog, State, tree_basis
@@ -57,6 +58,14 @@ def dense(C):
         for i in range(count - lag):
             whole[i, :, i + lag], whole[i + lag, :, i] = C.bands[lag, i], C.bands[lag, i].T
     return whole.reshape(count * kinds, -1)
+
+
+def forward(robot, q):
+    """Return MuJoCo's data of a robot at rest in some place."""
+    data = mujoco.MjData(robot.model)
+    data.qpos[:] = q
+    mujoco.mj_forward(robot.model, data)
+    return data
 
 
 def at(q, qd, qdd):

@@ -27,9 +27,8 @@ WRIST = """<mujoco><compiler angle="radian"/><worldbody>
 
 
 @pytest.fixture
-def wrist(tmp_path):
-    (tmp_path / "wrist.xml").write_text(WRIST)
-    return str(tmp_path / "wrist.xml")
+def wrist(written):
+    return written(WRIST)
 
 
 def torques(robot, q, qd, qdd):

@@ -10,7 +10,6 @@ from idbench.sim.drives import DRIVES, AveragedDrive, IdealDrive, SwitchedDrive
 from idbench.sim.engine.simulation import simulate
 from idbench.sim.engine.watch import Watch
 from idbench.sim.errors import RobotError, ScenarioError
-from idbench.sim.robot.robot import Robot
 
 
 def stepped(drive, robot, demand, speed, h, steps):
@@ -128,10 +127,8 @@ def test_without_emf_compensation_a_motor_seems_heavier(short):
         np.testing.assert_allclose(slope, apparent[j], rtol=0.1)
 
 
-def test_a_robot_without_motors_is_told(tmp_path):
-    path = tmp_path / "bare.xml"
-    path.write_text('<mujoco><worldbody><body><joint name="hip"/><geom size="1"/></body></worldbody></mujoco>')
-    bare = Robot.load(str(path))
+def test_a_robot_without_motors_is_told(load_robot):
+    bare = load_robot('<mujoco><worldbody><body><joint name="hip"/><geom size="1"/></body></worldbody></mujoco>')
     with pytest.raises(RobotError, match="joint hip has no dcmotor of its own in the MJCF"):
         AveragedDrive().start(bare, 1, 1e-3)
     assert isinstance(DRIVES.create("ideal").start(bare, 1, 1e-3).step(np.ones((1, 1)), np.zeros((1, 1, 1)), 1), np.ndarray)

@@ -43,16 +43,6 @@ CROOKED = """
 """Welded bodies, two hinges on one body beside their frames, a slide, two branches, references, gravity askew."""
 
 
-@pytest.fixture
-def written(tmp_path):
-    def write(text, name="arm.xml"):
-        path = tmp_path / name
-        path.write_text(text)
-        return str(path)
-
-    return write
-
-
 @pytest.mark.parametrize("name", ["crooked", "scara", "puma560", "panda"])
 def test_columns_times_truth_are_mujocos_inverse_dynamics(name, written, rng):
     robot, _, found, X = arm(written(CROOKED) if name == "crooked" else name)
