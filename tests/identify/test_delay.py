@@ -111,9 +111,20 @@ def test_the_lag_of_a_current_loop_is_found_as_well():
     assert estimate_delay(without_delay(run), scara()).delay == pytest.approx(0.003 + 1 / (2 * np.pi * 200), abs=5e-5)
 
 
-def test_several_logs_have_one_delay(log):
-    late = MotionLog(log.fs, log.q[:-1], log.tau[1:], log.torque)  # the torque of the next instant: late by -10 ms
-    assert estimate_delay([late, late], scara()).delay == pytest.approx(0.01, abs=1e-5)
+@pytest.mark.parametrize("apart", [0.0, 0.003])
+def test_logs_whose_delays_differ_are_said_to_differ(apart, log, rng):
+    """Sigma of one delay for both is then at least their scatter, apart / sqrt(2) for two, less what noise makes of it."""
+    each = []
+    for late in (0.002, 0.002 + apart):
+        tau = np.stack([np.interp(log.t - late, log.t, x) for x in log.tau.T], axis=1)
+        each.append(noisy(replace(log, tau=tau), 0, [0.05, 0.005], rng=rng))
+    found = estimate_delay(each, scara())
+    assert found.delay == pytest.approx(-0.002 - apart / 2, abs=2e-4)
+    assert bool(found.of_logs) == bool(apart)
+    assert ("the logs differ" in found.words) == bool(apart)
+    if apart:
+        np.testing.assert_allclose(found.of_logs, [-0.002, -0.005], atol=2e-4)
+        assert found.doubt > 0.9 * apart / np.sqrt(2)
 
 
 def test_what_cannot_be_estimated_is_told(log):

@@ -165,19 +165,3 @@ def test_a_log_too_short_for_10_hz_keeps_its_fit(log):
     assert np.isfinite(found.X).all()
     assert torque_interval(found) is None
     assert suited_reach(found.problem) == ()
-
-
-@pytest.mark.parametrize("apart", [0.0, 0.003])
-def test_logs_whose_delays_differ_are_said_to_differ(apart, log, rng):
-    """Sigma of one delay for both is then at least their scatter, apart / sqrt(2) for two, less what noise makes of it."""
-    each = []
-    for late in (0.002, 0.002 + apart):
-        tau = np.stack([np.interp(log.t - late, log.t, x) for x in log.tau.T], axis=1)
-        each.append(noisy(replace(log, tau=tau), 0, [0.05, 0.005], rng=rng))
-    found = estimate_delay(each, scara())
-    assert found.delay == pytest.approx(-0.002 - apart / 2, abs=2e-4)
-    assert bool(found.of_logs) == bool(apart)
-    assert ("the logs differ" in found.words) == bool(apart)
-    if apart:
-        np.testing.assert_allclose(found.of_logs, [-0.002, -0.005], atol=2e-4)
-        assert found.doubt > 0.9 * apart / np.sqrt(2)

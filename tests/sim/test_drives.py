@@ -26,15 +26,6 @@ def test_averaged_locked_rotor_step_is_the_exponential(robot):
     np.testing.assert_allclose(tau, expected, rtol=1e-9)
 
 
-def test_the_bare_winding_steps_exponentially_at_its_voltage_limit(robot):
-    """More torque is asked for than 10 V can drive into a standing motor: i = V/R (1 - exp(-t R/L)), to 1e-9."""
-    m, h, t = robot.motors, 1e-4, 1e-4 * np.arange(31)
-    _, tau = stepped(AveragedDrive(bus_voltage=10.0), robot, np.array([100.0, 10.0]), np.zeros(2), h, 30)
-    rate = m.R / m.L
-    expected = m.K * 10 / m.R * (1 + np.diff(np.exp(-np.outer(t, rate)), axis=0) / rate / h)
-    np.testing.assert_allclose(tau, expected, rtol=1e-9)
-
-
 def test_averaged_is_the_integral_of_its_equation_where_it_saturates_and_lets_go(robot):
     """Against LSODA with the voltage clipped: mean torque of steps to 1e-6 of the largest."""
     m, h, w = robot.motors, 5e-4, 2 * np.pi * 1000
