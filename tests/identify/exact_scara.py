@@ -22,13 +22,24 @@ def soft(speed):
     return lambda v, sign: COULOMB * np.tanh(v / speed)
 
 
-def rigid(q, v):
+def rigid(q, v, X=X):
     """Return M11, M12, M22 and the Coriolis torques."""
     ZZR1, _, _, ZZ2, LMX2, LMY2, _, _ = X
-    c, s = np.cos(q[:, 1]), np.sin(q[:, 1])
+    c, s = np.cos(q[..., 1]), np.sin(q[..., 1])
     k, g = LMX2 * c - LMY2 * s, LMX2 * s + LMY2 * c
-    coriolis = np.stack([-g * (2 * v[:, 0] + v[:, 1]) * v[:, 1], g * v[:, 0] ** 2], axis=1)
+    coriolis = np.stack([-g * (2 * v[..., 0] + v[..., 1]) * v[..., 1], g * v[..., 0] ** 2], axis=-1)
     return ZZR1 + ZZ2 + 2 * k, ZZ2 + k, ZZ2 + 0 * k, coriolis
+
+
+def momentum(X, q, v):
+    """Return M(q) v."""
+    M11, M12, M22, _ = rigid(q, v, X)
+    return np.stack([M11 * v[..., 0] + M12 * v[..., 1], M12 * v[..., 0] + M22 * v[..., 1]], axis=-1)
+
+
+def torque(X, q, v, a):
+    """Return the torques of a motion (Eq. 51)."""
+    return momentum(X, q, a) + rigid(q, v, X)[-1] + X[[1, 6]] * v + X[[2, 7]] * np.sign(v)
 
 
 def acceleration(q, v, u, sign, sticks, law):
@@ -62,9 +73,8 @@ def simulated(motion, law=coulomb, static=1.0, jumps=True):
     found = np.zeros((3, *reference.shape))
     for k in range(reference.shape[1]):
         wanted = bend[:, k] + 50 * (rate[:, k] - v) + 625 * (reference[:, k] - q)
-        M11, M12, M22, coriolis = rigid(q, v)
-        u = np.stack([M11 * wanted[:, 0] + M12 * wanted[:, 1], M12 * wanted[:, 0] + M22 * wanted[:, 1]], axis=1)
-        u += coriolis + VISCOUS * v + COULOMB * np.tanh(rate[:, k] / 0.02)
+        u = momentum(X, q, wanted)
+        u += rigid(q, v)[-1] + VISCOUS * v + COULOMB * np.tanh(rate[:, k] / 0.02)
         found[:, :, k] = q, v, u
         for _ in range(STEPS):
             if jumps:
@@ -101,10 +111,10 @@ def through_events(q, v, u, sign, sticks, law, static):
     return q, v, sign, sticks
 
 
-def series(runs, seconds=26, harmonics=14):
-    """Return random sums of sines, of periods of 2 to 13 s: about 26 reversals of the first joint."""
-    t, rng = np.arange(round(seconds / PERIOD)) * PERIOD, np.random.default_rng(0)
-    w = 2 * np.pi / seconds * np.arange(2, harmonics + 1)
+def series(runs, seconds=26, harmonics=range(2, 15), period=26, seed=0, acceleration=(8, 20)):
+    """Return random sums of sines, by default of periods of 2 to 13 s: about 26 reversals of the first joint."""
+    t, rng = np.arange(round(seconds / PERIOD)) * PERIOD, np.random.default_rng(seed)
+    w = 2 * np.pi / period * np.array(harmonics)
     a, b = rng.standard_normal((2, runs, 2, len(w)))
     sine, cosine = np.sin(w * t[:, None]), np.cos(w * t[:, None])
     q, qd, qdd = (
@@ -112,18 +122,18 @@ def series(runs, seconds=26, harmonics=14):
         for scale, x, y in ((1 / w, sine, -cosine), (np.ones_like(w), cosine, sine), (w, -sine, cosine))
     )
     size = np.minimum(1.5 / np.abs(q).max(axis=1), 3 / np.abs(qd).max(axis=1))
-    size = np.minimum(size, [8, 20] / np.abs(qdd).max(axis=1))[:, None]
+    size = np.minimum(size, np.array(acceleration) / np.abs(qdd).max(axis=1))[:, None]
     return size * q, size * qd, size * qdd
 
 
-def moves(runs, seconds=26):
+def moves(runs, seconds=26, durations=(0.8, 1.3), begin=0.3, seed=0):
     """Return random fifth-order moves with rests."""
-    t, rng = np.arange(round(seconds / PERIOD)) * PERIOD, np.random.default_rng(0)
+    t, rng = np.arange(round(seconds / PERIOD)) * PERIOD, np.random.default_rng(seed)
     found = np.zeros((3, runs, len(t), 2))
     for run, joint in np.ndindex(runs, 2):
-        start, here = 0.3, 0.0
+        start, here = begin, 0.0
         while start < seconds:
-            duration, there = rng.uniform(0.8, 1.3), rng.uniform(-1.5, 1.5)
+            duration, there = rng.uniform(*durations), rng.uniform(-1.5, 1.5)
             inside, s = (start <= t) & (start + duration > t), np.clip((t - start) / duration, 0, 1)
             found[0, run, t >= start, joint] = (here + (there - here) * (10 * s**3 - 15 * s**4 + 6 * s**5))[t >= start]
             found[1, run, inside, joint] = ((there - here) * 30 * (s - s**2) ** 2 / duration)[inside]

@@ -6,6 +6,7 @@ from importlib.metadata import files
 
 import numpy as np
 import pytest
+from builders import arm, at, matrix
 
 import idbench.identify.parameters.base_parameters
 from idbench.identify import (
@@ -22,7 +23,6 @@ from idbench.identify import (
     Parameter,
     Problem,
     SettingError,
-    State,
     TreeLinks,
     ViscousFriction,
     idbench_chain,
@@ -33,7 +33,7 @@ from idbench.identify import (
 from idbench.identify.data.motion_log import MotionLog, TorqueChannel
 from idbench.sim.engine.run import ideal_log
 from idbench.sim.robot.robot import Robot
-from idbench.sim.robot.tree import kinematic_tree, standard_parameters
+from idbench.sim.robot.tree import kinematic_tree
 from idbench.sim.trajectories import RandomMoves
 
 
@@ -43,10 +43,7 @@ def inertial(tree):
 
 
 def columns(basis, q, qd, qdd):
-    W = np.zeros((basis.n, q.shape[-1], len(basis.names)))
-    for (row, k), signal in basis.explicit(State(q, qd, lambda _: qdd)).items():
-        W[row, :, k] = signal
-    return W.reshape(-1, len(basis.names))
+    return matrix(basis.explicit(at(q, qd, qdd)), basis.n, basis.names, q.shape[-1]).reshape(-1, len(basis.names))
 
 
 def planar(count, gravity):
@@ -82,17 +79,15 @@ def test_counts_of_other_peoples_arms(peer):
 
 @pytest.mark.parametrize("robot", ["scara", "puma560", "panda"])
 def test_base_parameters_make_the_same_torques(robot, rng):
-    tree = kinematic_tree(Robot.load(robot))
-    found = BaseParameters.of(tree, tree_basis(tree))
+    _, tree, found, X = arm(robot)
     states = rng.uniform(-3, 3, (3, tree.n, 50))
-    X = rng.normal(size=len(found.standard.names))
+    X = rng.normal(size=len(X))
     torques = columns(found.standard, *states) @ X
     np.testing.assert_allclose(columns(found.basis, *states) @ found.base(X), torques, atol=1e-10 * np.abs(torques).max())
 
 
 def test_names_show_the_grouping():
-    tree = kinematic_tree(Robot.load("scara"))
-    found = BaseParameters.of(tree, tree_basis(tree))
+    found = arm("scara").grouping
     assert found.names == ("ZZR1", "Fv1", "Fs1", "ZZ2", "MX2", "MY2", "Fv2", "Fs2")
     assert found.grouping(0) == "ZZ1 + Ia1 + 0.25 M2"
     assert found.grouping(4) == "MX2"
@@ -131,13 +126,9 @@ def test_the_scaras_tree_spans_its_closed_form_and_gives_the_same_estimates(log,
 @pytest.mark.parametrize("robot", ["puma560", "panda"])
 def test_ideal_data_give_every_base_parameter_in_all_models(robot):
     """Torques by MuJoCo, sensors exact: the remaining error is that of differences and of what lies between samples."""
-    arm = Robot.load(robot)
-    tree = kinematic_tree(arm)
-    found = BaseParameters.of(tree, tree_basis(tree))
+    made, _, found, standard = arm(robot)
     moves = RandomMoves(moves=25, durations=(0.9, 1.5), velocity=(2.0,), rest=1.0)
-    log = ideal_log(arm, moves.sample(arm, 200.0))
-    truth = standard_parameters(arm)
-    X = found.base(np.array([truth[name] for name in found.standard.names]))
+    log, X = ideal_log(made, moves.sample(made, 200.0)), found.base(standard)
     models = {name: MODELS.create(name) for name in MODELS.builtin}
     for name, estimate in identify_each(log, found.basis, models, idbench_chain()).items():
         weight = np.linalg.norm(estimate.rows.W, axis=0) / np.linalg.norm(estimate.rows.Y)
@@ -146,8 +137,7 @@ def test_ideal_data_give_every_base_parameter_in_all_models(robot):
 
 def test_a_motion_that_hides_parameters_is_told_from_a_robot_that_does(log):
     """Structural: ZZ1 and Ia1 are one parameter on any motion. Of the data: joint 2 stands, and what it moves is not shown."""
-    tree = kinematic_tree(Robot.load("scara"))
-    found = BaseParameters.of(tree, tree_basis(tree))
+    found = arm("scara").grouping
     still = MotionLog(log.fs, log.q * [1, 0], log.tau, TorqueChannel("instantaneous"))
     factor = Problem((still,), found.basis, MODELS.create("power"), idbench_chain()).factors.together
     assert set(factor.not_shown()) >= {"Fv2", "Fs2"}
@@ -156,8 +146,7 @@ def test_a_motion_that_hides_parameters_is_told_from_a_robot_that_does(log):
 
 
 def test_parameters_can_be_left_out_and_unknown_ones_are_refused():
-    tree = kinematic_tree(Robot.load("panda"))
-    basis = BaseParameters.of(tree, tree_basis(tree)).basis
+    basis = arm("panda").grouping.basis
     fewer = basis.without("Fs1", "ZZR1")
     assert set(basis.names) - set(fewer.names) == {"Fs1", "ZZR1"}
     assert len(fewer.units) == len(fewer.names)
@@ -166,10 +155,9 @@ def test_parameters_can_be_left_out_and_unknown_ones_are_refused():
 
 
 def test_the_grouping_does_not_depend_on_the_states_that_were_drawn(monkeypatch):
-    tree = kinematic_tree(Robot.load("panda"))
-    one = BaseParameters.of(tree, tree_basis(tree))
+    one = arm("panda").grouping
     monkeypatch.setattr(idbench.identify.parameters.base_parameters, "SEED", 7)
-    two = BaseParameters.of(tree, tree_basis(tree))
+    two = arm("panda").grouping
     assert one.names == two.names
     np.testing.assert_allclose(one.K, two.K, atol=1e-9)
 
@@ -199,18 +187,18 @@ def exact(x):
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("arm", ARMS)
-def test_rounded_angles_do_not_change_the_grouping(arm, tmp_path):
+@pytest.mark.parametrize("name", ARMS)
+def test_rounded_angles_do_not_change_the_grouping(name, tmp_path):
     """As shipped, and with two digits, 1.57: the same parameters stay as with exact angles, and all rotors are asked for."""
-    (path,) = [f.locate() for f in files("example-robot-data") or () if str(f).endswith(ARMS[arm])]
+    (path,) = [f.locate() for f in files("example-robot-data") or () if str(f).endswith(ARMS[name])]
     kept = []
-    for name, angle in (("exact", exact), ("shipped", str), ("rounded", lambda x: f"{x:.2f}")):
-        (tmp_path / f"{name}.urdf").write_text(turned(path.read_text(), angle))
-        tree = kinematic_tree(Robot.load(str(tmp_path / f"{name}.urdf")))
+    for file, angle in (("exact", exact), ("shipped", str), ("rounded", lambda x: f"{x:.2f}")):
+        (tmp_path / f"{file}.urdf").write_text(turned(path.read_text(), angle))
+        tree = kinematic_tree(Robot.load(str(tmp_path / f"{file}.urdf")))
         tree = replace(tree, joints=tuple(replace(joint, armature=True) for joint in tree.joints))
         kept.append(BaseParameters.of(tree, tree_basis(tree)).kept)
     assert len(kept[0]) == len(kept[1]) == len(kept[2])
-    assert arm not in {"ur3", "z1"} or kept[0] == kept[1] == kept[2]
+    assert name not in {"ur3", "z1"} or kept[0] == kept[1] == kept[2]
 
 
 def test_parameters_whose_names_end_in_no_digit_are_grouped():

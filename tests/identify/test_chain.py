@@ -4,14 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from builders import noisy
 
 from idbench.identify import (
     CHAINS,
+    ESTIMATORS,
     MODELS,
     OPERATORS,
     PREFILTERS,
     Basis,
-    Chain,
     CoulombFriction,
     ExcitationError,
     ExplicitModel,
@@ -22,7 +23,6 @@ from idbench.identify import (
     PowerModel,
     Problem,
     ReversalMask,
-    Rows,
     SettingError,
     TorqueChannel,
     ViscousFriction,
@@ -39,6 +39,9 @@ CHANNELS = [
     TorqueChannel("instantaneous"),
     *(TorqueChannel(meaning, delay) for meaning in ("held", "averaged", "instantaneous") for delay in (0.007, -0.013, 0.052)),
 ]
+
+
+BITS16 = 2 * np.pi / 2**16 / np.sqrt(12)
 
 
 def rows_of(log, model, chain):
@@ -117,6 +120,18 @@ def test_a_batch_is_identified_run_by_run_with_the_same_bits(name, log):
     assert np.isnan(together.X[1]).all()
 
 
+@pytest.mark.parametrize("acronym", ["WLS", "GLS", "ML"])
+def test_a_run_that_cannot_be_solved_leaves_the_others(acronym, log):
+    """Of two runs one stands, or has no torques that move it: the other is as it is alone, with its sigma."""
+    one = noisy(log, BITS16, (0.1, 0.005), rng=11)
+    both = MotionLog(log.fs, np.stack([one.q, 0 * one.q]), np.stack([one.tau, 0 * one.tau]), log.torque)
+    estimator = ESTIMATORS.create(acronym)
+    alone, found = (identify(x, scara(), ExplicitModel(), estimator=estimator, throw=False) for x in (one, both))
+    assert np.isnan([found.X[1], found.standard_errors[1]]).all()
+    np.testing.assert_array_equal(found.X[0], alone.X)
+    np.testing.assert_array_equal(found.standard_errors[0], alone.standard_errors)
+
+
 def test_a_joint_that_never_moves_is_told_with_the_parameters_it_hides(table1):
     waypoints = tuple((q1, 0.3) for q1, _ in table1.scenario.trajectory.waypoints)
     still = replace(table1.scenario.trajectory, waypoints=waypoints)
@@ -173,15 +188,6 @@ def test_a_basis_may_be_part_of_a_robot(log):
     """Parameters left out cost no error: the friction of a robot whose links are known."""
     basis = Basis(2, (ViscousFriction(), CoulombFriction()))
     assert identify(log, basis, ExplicitModel()).names == ("Fv1", "Fv2", "Fs1", "Fs2")
-
-
-def test_chain_is_what_it_says(log):
-    chain: Chain = idbench_chain()
-    built = Problem((log,), scara(), PowerModel(), chain).rows
-    assert isinstance(built, Rows)
-    halo = replace(chain, prefilter=chain.suited_prefilter(log)).halo(100.0, log.torque)
-    assert built.time[0] >= halo - 1e-9
-    assert built.time[-1] <= log.t[-1] - halo + 1e-9
 
 
 @pytest.mark.parametrize("channel", CHANNELS)

@@ -5,7 +5,6 @@ import pytest
 
 from idbench.identify import LogError, TorqueChannel
 from idbench.identify.data.clock import LogClock
-from idbench.identify.data.jumps import Velocities
 from idbench.identify.data.log_columns import LogColumns
 from idbench.identify.data.resample import Repaired
 
@@ -15,10 +14,6 @@ T = np.arange(0, 8, 1 / FS)
 
 def motion(t):
     return np.stack([np.sin(1.3 * t) + 0.5 * np.sin(3 * t), np.cos(2 * t)], axis=1)
-
-
-def speed(t):
-    return np.stack([1.3 * np.cos(1.3 * t) + 1.5 * np.cos(3 * t), -2 * np.sin(2 * t)], axis=1)
 
 
 @pytest.fixture
@@ -144,28 +139,3 @@ def test_coarse_positions_alone_are_no_repeats():
     step, late = 2 * np.pi / 4096, T + 1e-4
     found = repair(LogColumns(T, np.round(0.1 * motion(T) / step) * step, motion(late), None, t_tau=late))
     assert found.clock.repeated == 0
-
-
-def test_velocities_that_know_better_are_used(rng):
-    """A 12-bit encoder beside a tachometer: errors fall below a fifth; both noises alone are an order larger."""
-    step = 2 * np.pi / 4096
-    q, qd = np.round(motion(T) / step) * step, speed(T) + 1e-3 * rng.normal(size=(len(T), 2))
-    found = Velocities.of(q, qd, FS)
-    assert found.used.all()
-    inner = slice(500, -500)
-    better = np.std((found.improved(q, qd) - motion(T))[inner], axis=0)
-    assert (better < 0.2 * np.std((q - motion(T))[inner], axis=0)).all()
-
-
-@pytest.mark.parametrize(
-    ("wrong", "message"),
-    [
-        (lambda qd: 57.3 * qd, "57.3 times the differences"),
-        (lambda qd: np.roll(qd, 6, axis=0), "6 ms late: not used"),
-    ],
-    ids=["degrees", "late"],
-)
-def test_velocities_that_are_not_those_of_the_positions(wrong, message, columns):
-    found = Velocities.of(columns.q, wrong(speed(T)), FS)
-    assert not found.used.any()
-    assert message in " ".join(found.words(("a", "b")))

@@ -3,28 +3,32 @@
 import numpy as np
 import pytest
 import scipy
+from builders import arm
 
-from idbench.identify import BaseParameters, IdentificationError, consistent_parameters, tree_basis
+from idbench.identify import IdentificationError, consistent_parameters
 from idbench.identify.data.kinematics import INERTIAL
 from idbench.identify.parameters.bodies import inertial, pseudo_inertia
 from idbench.sim.robot.rewrite import rewritten
-from idbench.sim.robot.robot import Robot
-from idbench.sim.robot.tree import kinematic_tree, standard_parameters
 
 
 @pytest.fixture(scope="module", params=["scara", "puma560", "panda"])
-def arm(request):
-    robot = Robot.load(request.param)
-    tree = kinematic_tree(robot)
-    grouping = BaseParameters.of(tree, tree_basis(tree))
-    truth = standard_parameters(robot)
-    return grouping, np.array([truth[name] for name in grouping.standard.names])
+def robot(request):
+    return arm(request.param)
+
+
+@pytest.fixture
+def scara():
+    return arm("scara")
+
+
+def places(grouping, j):
+    """Return where the ten parameters of link j, from 0, stand."""
+    return [grouping.standard.names.index(f"{x}{j + 1}") for x in INERTIAL]
 
 
 def links(grouping, values):
-    names = grouping.standard.names
     for j in range(grouping.standard.n):
-        yield pseudo_inertia(values[[names.index(f"{x}{j + 1}") for x in INERTIAL]])
+        yield pseudo_inertia(values[places(grouping, j)])
 
 
 def test_a_pseudo_inertia_holds_the_second_moments_of_the_mass(rng):
@@ -35,21 +39,20 @@ def test_a_pseudo_inertia_holds_the_second_moments_of_the_mass(rng):
     np.testing.assert_allclose(pseudo_inertia(values), (homogeneous.T * masses) @ homogeneous, atol=1e-12)
 
 
-def test_the_truth_comes_back_from_an_estimate_without_error(arm):
-    grouping, X = arm
+def test_the_truth_comes_back_from_an_estimate_without_error(robot):
+    _, _, grouping, X = robot
     found = consistent_parameters(grouping, grouping.base(X), 1e-6 * np.eye(len(grouping.names)), X)
     assert found.agrees
     np.testing.assert_allclose(found.standard, X, atol=1e-5 * np.abs(X).max())
 
 
-def test_another_given_model_changes_what_no_motion_shows_and_nothing_else(arm, rng):
-    grouping, X = arm
+def test_another_given_model_changes_what_no_motion_shows_and_nothing_else(robot, rng):
+    _, _, grouping, X = robot
     base = grouping.base(X)
     sigma = 1e-3 * np.maximum(np.abs(base), 0.01)
     other = X.copy()
     for j in range(grouping.standard.n):
-        mine = [grouping.standard.names.index(f"{x}{j + 1}") for x in INERTIAL]
-        other[mine] *= rng.uniform(0.8, 1.25)
+        other[places(grouping, j)] *= rng.uniform(0.8, 1.25)
     found = consistent_parameters(grouping, base, np.diag(sigma**2), other)
     assert found.agrees
     assert np.abs(found.departure).max() < 0.1  # of a sigma
@@ -57,9 +60,9 @@ def test_another_given_model_changes_what_no_motion_shows_and_nothing_else(arm, 
     assert np.abs(found.standard - X).max() > 1e-3  # the given model's where nothing else is known
 
 
-def test_impossible_estimates_get_the_nearest_possible_bodies_and_are_told(arm):
+def test_impossible_estimates_get_the_nearest_possible_bodies_and_are_told(robot):
     """Fs1 below zero by ten sigma: the nearest has none."""
-    grouping, X = arm
+    _, _, grouping, X = robot
     base = grouping.base(X)
     sigma = np.full(len(base), 1e-3)
     i = grouping.names.index("Fs1")
@@ -73,11 +76,11 @@ def test_impossible_estimates_get_the_nearest_possible_bodies_and_are_told(arm):
 
 
 @pytest.mark.parametrize("mass", [1e-3, 1e-6, 1e-9, 1e-12])
-def test_a_last_body_of_next_to_nothing_does_not_keep_the_estimate_away(arm, mass):
+def test_a_last_body_of_next_to_nothing_does_not_keep_the_estimate_away(robot, mass):
     """The file has a dot where the tool is; friction, which no body is coupled to, does not move at all, though correlated."""
-    grouping, X = arm
+    _, _, grouping, X = robot
     rng, base, given = np.random.default_rng(0), grouping.base(X), X.copy()
-    last = [grouping.standard.names.index(f"{x}{grouping.standard.n}") for x in INERTIAL]
+    last = places(grouping, grouping.standard.n - 1)
     given[last] *= mass / X[last[-1]]
     sigma = 1e-3 * np.maximum(np.abs(base), 0.01)
     correlated = np.eye(len(base)) + 0.1 * rng.normal(size=(len(base), len(base)))
@@ -89,18 +92,16 @@ def test_a_last_body_of_next_to_nothing_does_not_keep_the_estimate_away(arm, mas
     np.testing.assert_array_equal(found.base[friction], estimate[friction])
 
 
-def test_a_link_too_slender_for_its_inertia_is_moved_as_little_as_its_sigma_asks():
+def test_a_link_too_slender_for_its_inertia_is_moved_as_little_as_its_sigma_asks(scara):
     """SCARA: ZZ2 must exceed (MX2^2 + MY2^2) / M2, whatever M2: with M2 free there are bodies; negative ZZ2 has none."""
-    robot = Robot.load("scara")
-    tree = kinematic_tree(robot)
-    grouping = BaseParameters.of(tree, tree_basis(tree))
-    truth = standard_parameters(robot)
-    X = np.array([truth[name] for name in grouping.standard.names])
+    _, _, grouping, X = scara
     base, sigma = grouping.base(X), np.full(8, 1e-3)
     slender = base.copy()
     slender[grouping.names.index("ZZ2")] = 0.005  # below 0.0289 of 2 kg there
     found = consistent_parameters(grouping, slender, np.diag(sigma**2), X)
     assert found.agrees
+    assert found.distance < 1
+    assert min(np.linalg.eigvalsh(S)[0] for S in links(grouping, found.standard)) > 1e-5  # no thinner than that asks
     mass = dict(zip(found.names, found.standard, strict=True))["M2"]
     assert mass > (0.24**2 + 0.01**2) / 0.0051
     impossible = base.copy()
@@ -108,8 +109,8 @@ def test_a_link_too_slender_for_its_inertia_is_moved_as_little_as_its_sigma_asks
     assert not consistent_parameters(grouping, impossible, np.diag(sigma**2), X).agrees
 
 
-def test_what_cannot_be_used_is_refused(arm):
-    grouping, X = arm
+def test_what_cannot_be_used_is_refused(robot):
+    _, _, grouping, X = robot
     base, C = grouping.base(X), np.eye(len(grouping.names))
     with pytest.raises(IdentificationError, match="covariance of the estimate is not positive definite"):
         consistent_parameters(grouping, base, C - 2 * np.eye(len(C)), X)
@@ -121,13 +122,9 @@ def test_what_cannot_be_used_is_refused(arm):
 
 def test_a_link_of_a_needle_is_left_with_room_for_the_solver(rng):
     """A given link with an eigenvalue of 1e-9 of its trace, estimates off by many sigma: no link ends outside of its cone."""
-    robot = Robot.load("puma560")
-    tree = kinematic_tree(robot)
-    grouping = BaseParameters.of(tree, tree_basis(tree))
-    truth = standard_parameters(robot)
-    X = np.array([truth[name] for name in grouping.standard.names])
-    for j in (2, 6):
-        mine = [grouping.standard.names.index(f"{x}{j}") for x in INERTIAL]
+    _, _, grouping, X = arm("puma560")
+    for j in (1, 5):
+        mine = places(grouping, j)
         values, axes = np.linalg.eigh(pseudo_inertia(X[mine]))
         X[mine] = inertial((axes * np.maximum(values, [1e-9 * values.sum(), 0, 0, 0])) @ axes.T)
     for _ in range(5):
@@ -139,14 +136,11 @@ def test_a_link_of_a_needle_is_left_with_room_for_the_solver(rng):
         rewritten("puma560", dict(zip(found.names, found.standard, strict=True)))
 
 
-def test_a_plate_is_given_some_thickness():
+def test_a_plate_is_given_some_thickness(scara):
     """Moments 0.1, 0.1 and 0.2: flat, as MuJoCo allows; an estimate near it is written all the same."""
-    robot = Robot.load("scara")
-    tree = kinematic_tree(robot)
-    grouping = BaseParameters.of(tree, tree_basis(tree))
-    plate = {"XX1": 0.1, "YY1": 0.1, "ZZ1": 0.2, "MX1": 0.0, "XY1": 0.0, "XZ1": 0.0, "YZ1": 0.0}
-    truth = standard_parameters(robot) | plate
-    X = np.array([truth[name] for name in grouping.standard.names])
+    _, _, grouping, X = scara
+    plate = {"XX": 0.1, "YY": 0.1, "ZZ": 0.2, "MX": 0.0, "XY": 0.0, "XZ": 0.0, "YZ": 0.0}
+    X[[grouping.standard.names.index(f"{x}1") for x in plate]] = list(plate.values())
     found = consistent_parameters(grouping, grouping.base(X), 1e-6 * np.eye(8), X)
     assert found.agrees
     assert min(np.linalg.eigvalsh(S)[0] for S in links(grouping, found.standard)) > -1e-9
@@ -159,9 +153,9 @@ def distance(S0, S):
 
 
 @pytest.mark.parametrize("weight", [1e-4, 1.0, 100.0])
-def test_no_other_bodies_agree_better(arm, rng, weight):
+def test_no_other_bodies_agree_better(robot, rng, weight):
     """The objective, typed here by eigenvalues, does not fall along 40 directions to either side."""
-    grouping, X = arm
+    _, _, grouping, X = robot
     base = grouping.base(X)
     sigma = 0.02 * np.maximum(np.abs(base), 0.01)
     estimate = base + 3 * sigma * rng.standard_normal(len(base))
@@ -184,39 +178,22 @@ def test_no_other_bodies_agree_better(arm, rng, weight):
                 assert objective(moved) > least - 1e-6 * max(1.0, least)
 
 
-def test_a_link_does_not_become_thinner_than_the_estimate_asks():
-    """An estimate of ZZ2 that takes a slender link; of all such links the one whose shape is nearest to the file's."""
-    robot = Robot.load("scara")
-    tree = kinematic_tree(robot)
-    grouping = BaseParameters.of(tree, tree_basis(tree))
-    truth = standard_parameters(robot)
-    X = np.array([truth[name] for name in grouping.standard.names])
-    base = grouping.base(X)
-    base[grouping.names.index("ZZ2")] = 0.005
-    found = consistent_parameters(grouping, base, np.diag(np.full(8, 1e-3) ** 2), X)
-    assert found.distance < 1
-    assert min(np.linalg.eigvalsh(S)[0] for S in links(grouping, found.standard)) > 1e-5
-
-
-def test_a_given_model_of_unknown_size_takes_that_of_the_estimate(arm):
+def test_a_given_model_of_unknown_size_takes_that_of_the_estimate(robot):
     """Tables have no bodies: those of a gram that stand for them would hold the whole estimate."""
-    grouping, X = arm
+    _, _, grouping, X = robot
     base = grouping.base(X)
     sigma = 1e-3 * np.maximum(np.abs(base), 0.01)
     dust = X.copy()
     for j in range(grouping.standard.n):
-        dust[[grouping.standard.names.index(f"{x}{j + 1}") for x in INERTIAL]] *= 1e-6
+        dust[places(grouping, j)] *= 1e-6
     found = consistent_parameters(grouping, base, np.diag(sigma**2), dust)
     assert found.agrees
     assert np.abs(found.departure).max() < 0.1  # of a sigma
 
 
-def test_a_large_rotor_does_not_make_bodies_heavier(monkeypatch):
+def test_a_large_rotor_does_not_make_bodies_heavier(scara, monkeypatch):
     """It is grouped with the first link's inertia; the bodies that are given are right, and are not taken for placeholders."""
-    robot = Robot.load("scara")
-    tree = kinematic_tree(robot)
-    grouping = BaseParameters.of(tree, tree_basis(tree))
-    given = np.array([standard_parameters(robot)[name] for name in grouping.standard.names])
+    _, _, grouping, given = scara
     truth = given.copy()
     truth[grouping.standard.names.index("Ia1")] = 400.0
     base = grouping.base(truth)

@@ -26,9 +26,9 @@ def logs(robot):
     [((0.5, 0.025), "OLS"), ((0.5, 0.025), "WLS"), ((0.025, 0.5), "WLS"), ((0.5, 0.025), "GLS")],
 )
 def test_two_corrected_sigma_hold_the_truth_in_93_to_97_percent(estimator, sigma, logs, truth):
-    """For every parameter and model; 95.4 % is right, and 1500 runs tell it to 0.5 %. The paper's sigma does not do that.
+    """For every parameter and model; 95.4 % is right, and 1500 runs tell it to 0.5 %.
 
-    With the jackknife, where that is larger by chance, it holds up to 3 % more.
+    The paper's sigma is off by a factor, either way. With the jackknife, if that is larger, it holds up to 3 % more.
     """
     q, tau = logs
     noisy = tau + sigma * np.random.default_rng(11).standard_normal(tau.shape)
@@ -46,4 +46,6 @@ def test_two_corrected_sigma_hold_the_truth_in_93_to_97_percent(estimator, sigma
         assert share.max() <= 0.97, (name, share)
         assert 0.93 <= np.concatenate(whole[name]).mean() <= 0.985, name
     if estimator != "GLS":  # whose own sigma is that
-        assert min(np.concatenate(found).mean(axis=0).min() for found in papers.values()) < 0.92
+        share = np.array([np.concatenate(found).mean(axis=0) for found in papers.values()])
+        assert share.min() < 0.92
+        assert estimator != "OLS" or share.max() > 0.999  # that of more than twice its size

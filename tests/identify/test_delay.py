@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from builders import noisy
 
 from idbench.identify import (
     ESTIMATORS,
@@ -97,8 +98,7 @@ def test_a_known_delay_is_found_with_16_bits(delay, seed):
 @pytest.mark.thorough
 def test_its_sigma_is_its_scatter():
     """Twelve realizations of torque noise: the jackknife says the scatter, known to a fifth, to a factor of two."""
-    noisy = replace(load("ideal"), torque=TorqueMeasurement(noise=(0.5, 0.05)))
-    run = simulate(noisy, range(12))
+    run = simulate(replace(load("ideal"), torque=TorqueMeasurement(noise=(0.5, 0.05))), range(12))
     logs = [MotionLog(100.0, run.log.q[i], run.log.tau[i], TorqueChannel("held")) for i in range(12)]
     found = [estimate_delay(log, scara()) for log in logs]
     scatter = np.std([one.delay for one in found], ddof=1)
@@ -111,9 +111,20 @@ def test_the_lag_of_a_current_loop_is_found_as_well():
     assert estimate_delay(without_delay(run), scara()).delay == pytest.approx(0.003 + 1 / (2 * np.pi * 200), abs=5e-5)
 
 
-def test_several_logs_have_one_delay(log):
-    late = MotionLog(log.fs, log.q[:-1], log.tau[1:], log.torque)  # the torque of the next instant: late by -10 ms
-    assert estimate_delay([late, late], scara()).delay == pytest.approx(0.01, abs=1e-5)
+@pytest.mark.parametrize("apart", [0.0, 0.003])
+def test_logs_whose_delays_differ_are_said_to_differ(apart, log, rng):
+    """Sigma of one delay for both is then at least their scatter, apart / sqrt(2) for two, less what noise makes of it."""
+    each = []
+    for late in (0.002, 0.002 + apart):
+        tau = np.stack([np.interp(log.t - late, log.t, x) for x in log.tau.T], axis=1)
+        each.append(noisy(replace(log, tau=tau), 0, [0.05, 0.005], rng=rng))
+    found = estimate_delay(each, scara())
+    assert found.delay == pytest.approx(-0.002 - apart / 2, abs=2e-4)
+    assert bool(found.of_logs) == bool(apart)
+    assert ("the logs differ" in found.words) == bool(apart)
+    if apart:
+        np.testing.assert_allclose(found.of_logs, [-0.002, -0.005], atol=2e-4)
+        assert found.doubt > 0.9 * apart / np.sqrt(2)
 
 
 def test_what_cannot_be_estimated_is_told(log):
@@ -136,12 +147,11 @@ def test_standard_errors_contain_that_of_the_delay(log, rng, model):
 
     Of least squares, whose weights do not depend on the delay.
     """
-    noisy = MotionLog(log.fs, log.q, log.tau + [0.05, 0.0025] * rng.standard_normal(log.tau.shape), TorqueChannel("held"))
+    drawn = noisy(log, 0, [0.05, 0.0025], rng=rng)
 
     def fit(delay, sigma=0.0):
-        torque = TorqueChannel("held", delay, delay_sigma=sigma)
-        chosen = MODELS.create(model), ESTIMATORS.create("OLS")
-        return identify(replace(noisy, torque=torque), scara(), chosen[0], idbench_chain(), chosen[1])
+        late = replace(drawn, torque=TorqueChannel("held", delay, delay_sigma=sigma))
+        return identify(late, scara(), MODELS.create(model), estimator=ESTIMATORS.create("OLS"))
 
     plain, known = fit(0.001), fit(0.001, 5e-4)
     moved = (fit(0.0011).X - fit(0.0009).X) / 2e-4

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from builders import MOVES, closed
 
 from idbench.experiments.identification.fitting import fit
 from idbench.experiments.identification.logs import Logs
@@ -43,23 +44,13 @@ from idbench.sim.robot.tree import standard_parameters
 from idbench.sim.scenario.measurement import TorqueMeasurement
 from idbench.sim.scenario.scenario import Timing
 from idbench.sim.scenario.scenario_file import load
-from idbench.sim.trajectories import RandomMoves
 
-MOVES = RandomMoves(moves=12, durations=(1.3, 1.3), rest=0.7, seed=1)
 WIDE = replace(idbench_chain(), prefilter=NoPrefilter(), operator=replace(idbench_chain().operator, cutoff=20.0))
 """The chain with a band up to 20 Hz, which lets the noise of accelerations through."""
 
 
 def loop_of(scenario, log, start=None):
     return Simulation(ScenarioLoop.of(RobotModel(), (scenario,), (log,)), RobotPlant(RobotModel()), start)
-
-
-def closed(bits=None, runs=1, **parts):
-    """Return a scenario, and the log of its runs."""
-    encoder = {} if bits is None else {"encoder": IncrementalEncoder(lines=2 ** (bits - 2))}
-    scenario = replace(load("ideal"), **({"trajectory": MOVES} | encoder | parts))
-    log = simulate(scenario, range(runs)).log
-    return scenario, log if runs > 1 else log.run((0,))
 
 
 @pytest.fixture(scope="module")

@@ -1,11 +1,12 @@
-"""Filters against the closed forms of their gain, and their limits."""
+"""Filters against the closed forms of their gain, and windows that are exact for polynomials."""
 
 import numpy as np
 import pytest
 from scipy.special import eval_chebyt
 
-from idbench.identify import ButterworthPrefilter, FirLowPass, IirLowPass, LogError, SettingError
+from idbench.identify import ButterworthPrefilter, CentralDifference, FirLowPass, IirLowPass, LogError, SettingError
 from idbench.identify.rows.row_map import Grid
+from idbench.identify.signals.filters import averaged, shift
 
 FS = 100.0
 T = np.arange(4000) / FS
@@ -85,3 +86,44 @@ def test_settings_that_are_not_positive_are_refused(make):
 def test_a_log_shorter_than_the_filter_needs_is_refused():
     with pytest.raises(LogError, match="the log has 15 samples, the filter needs more than 15"):
         ButterworthPrefilter(8.0).apply(np.zeros(15), FS)
+
+
+SLOW = 50.0
+SHORT = np.arange(40) / SLOW
+INNER = slice(8, -8)
+
+
+def polynomial(rng, degree):
+    return np.polynomial.Polynomial(rng.normal(size=degree + 1))
+
+
+@pytest.mark.parametrize("order", [2, 6])
+def test_central_differences_are_exact_to_their_order(order, rng):
+    p = polynomial(rng, order)
+    derivative = CentralDifference(order).derivative(p(SHORT), SLOW)
+    np.testing.assert_allclose(derivative[INNER], p.deriv()(SHORT)[INNER], atol=1e-11)
+
+
+@pytest.mark.parametrize(("order", "droop"), [(2, lambda x: x**2 / 6), (6, lambda x: x**6 / 140)])
+def test_central_differences_droop_as_documented(order, droop):
+    w = 0.3 * SLOW  # rad/s
+    slope = CentralDifference(order).derivative(np.sin(w * (SHORT - SHORT[20])), SLOW)[20]
+    assert 1 - slope / w == pytest.approx(droop(w / SLOW), rel=0.05)  # the next term is 0.05 of it at w/fs = 0.3
+
+
+@pytest.mark.parametrize("samples", [0, 1, -2, 0.5, -0.31, 1.7])
+def test_shifts_are_exact_for_sixth_degree(samples, rng):
+    p = polynomial(rng, 6)
+    np.testing.assert_allclose(shift(p(SHORT), samples)[INNER], p(SHORT + samples / SLOW)[INNER], atol=1e-11)
+
+
+def test_cell_averages_are_exact_for_cubics(rng):
+    p = polynomial(rng, 3)
+    integral = p.integ()
+    mean = (integral(SHORT + 0.5 / SLOW) - integral(SHORT - 0.5 / SLOW)) * SLOW
+    np.testing.assert_allclose(averaged(p(SHORT), 1 / 12)[INNER], mean[INNER], atol=1e-12)
+
+
+def test_unknown_orders_are_refused():
+    with pytest.raises(SettingError, match="order 4 is unknown"):
+        CentralDifference(4)

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import exact_scara
 import numpy as np
 import pytest
 
@@ -40,12 +41,9 @@ def motion(seed=0, fs=FS, duration=T):
     return tuple(np.sum(x, axis=1) for x in (a * np.sin(turned), a * w * np.cos(turned), -a * w**2 * np.sin(turned))), t
 
 
-def rigid(q, qd, qdd, basis=None, values=X):
-    """Return the torques of a basis with these parameters."""
-    basis, total = basis or scara(), np.zeros_like(q)
-    for (row, k), column in basis.explicit(State(q, qd, lambda _: qdd)).items():
-        total[row] += values[k] * column
-    return total
+def rigid(q, qd, qdd):
+    """Return the torques of the SCARA, shape (joint, time)."""
+    return exact_scara.torque(X, q.T, qd.T, qdd.T).T
 
 
 def made(law, noise=0.0, seed=0, **conditions):
@@ -55,6 +53,14 @@ def made(law, noise=0.0, seed=0, **conditions):
     load = tau - X[[1, 6]][:, None] * qd - X[[2, 7]][:, None] * np.sign(qd)
     tau = tau + law(q, qd, load) + noise * np.random.default_rng([seed, 1]).standard_normal(q.shape)
     return MotionLog(FS, q.T, tau.T, TorqueChannel("instantaneous"), conditions)
+
+
+def no_law(q, qd, load):
+    return 0 * q
+
+
+def problem_of(law, noise=0.02, seed=0, basis=None):
+    return Problem((made(law, noise, seed),), basis or scara(), ExplicitModel(), idbench_chain())
 
 
 def stribeck_law(q, qd, load):
@@ -76,24 +82,31 @@ SHAPED = {
 }
 
 
-@pytest.mark.parametrize("name", SHAPED)
-def test_a_law_is_recovered(name):
+IN_PLACE = {
+    "tanh": ("Fs", lambda q, qd, load: 0.6 * np.tanh(qd / 0.3) - X[[2, 7]][:, None] * np.sign(qd), {"Ft1": 0.6, "vt2": 0.3}),
+    "power": ("Fv", lambda q, qd, load: 0.6 * np.abs(qd) ** 0.6 * np.sign(qd) - X[[1, 6]][:, None] * qd, {"Fp2": 0.6}),
+}
+"""Laws in the place of another."""
+
+
+@pytest.mark.parametrize(
+    ("name", "basis", "law", "truth"),
+    [
+        *((name, scara(), *shaped) for name, shaped in SHAPED.items()),
+        *((name, scara().without(f"{idle}1", f"{idle}2"), *shaped) for name, (idle, *shaped) in IN_PLACE.items()),
+        (StribeckFriction(vs=np.array([[0.3], [0.25]])), scara(), stribeck_law, {"Fst1": 0.3, "Fst2": 0.15}),
+    ],
+    ids=[*SHAPED, *IN_PLACE, "shapes known"],
+)
+def test_a_law_is_recovered(name, basis, law, truth):
     """To 2 %: the remaining error is the smoothing of the kinks at reversals."""
-    law, truth = SHAPED[name]
-    found = identify(made(law), scara() + BLOCKS.create(name), ExplicitModel(), estimator=ESTIMATORS.create("WLS"))
-    values = dict(zip(found.names, found.X, strict=True))
-    assert {key: values[key] for key in truth} == pytest.approx(truth, rel=0.02)
+    block = BLOCKS.create(name) if isinstance(name, str) else name
+    assert estimates(made(law), basis + block, truth) == pytest.approx(truth, rel=0.02)
 
 
-@pytest.mark.parametrize(("replaced", "name", "law", "truth"), [
-    ("Fs", "tanh", lambda q, qd, load: 0.6 * np.tanh(qd / 0.3) - X[[2, 7]][:, None] * np.sign(qd), {"Ft1": 0.6, "vt2": 0.3}),
-    ("Fv", "power", lambda q, qd, load: 0.6 * np.abs(qd) ** 0.6 * np.sign(qd) - X[[1, 6]][:, None] * qd, {"Fp2": 0.6}),
-])  # fmt: skip
-def test_a_law_in_the_place_of_another_is_recovered(replaced, name, law, truth):
-    basis = scara().without(f"{replaced}1", f"{replaced}2") + BLOCKS.create(name)
-    found = identify(made(law), basis, ExplicitModel(), estimator=ESTIMATORS.create("WLS"))
-    values = dict(zip(found.names, found.X, strict=True))
-    assert {key: values[key] for key in truth} == pytest.approx(truth, rel=0.02)
+def estimates(log, basis, names):
+    found = identify(log, basis, ExplicitModel(), estimator=ESTIMATORS.create("WLS"))
+    return {name: x for name, x in zip(found.names, found.X, strict=True) if name in names}
 
 
 def test_the_column_of_a_shape_is_its_slope():
@@ -123,8 +136,7 @@ def test_a_shape_has_one_minimum_out_of_several():
     """From a bad beginning, where a broad law with the other sign explains almost as much, it is left again."""
     law = BLOCKS.create("stribeck")
     wrong = replace(law, size=np.array([-0.5, -0.5]), values={"vs": np.array([1.0, 1.0])})
-    problem = Problem((made(stribeck_law, 0.002),), scara() + wrong, ExplicitModel(), idbench_chain())
-    found = settled(problem)
+    found = settled(problem_of(stribeck_law, 0.002, basis=scara() + wrong))
     assert found.basis.operating_point[found.basis.names.index("vs1")] == pytest.approx(0.3, rel=0.05)
 
 
@@ -137,7 +149,7 @@ def test_laws_of_single_joints():
 
 def test_a_parameter_that_is_held_counts_as_known():
     """What is held at its true value leaves the estimates of the others as they are without noise."""
-    log = made(lambda q, qd, load: 0.0 * q)
+    log = made(no_law)
     for model in (ExplicitModel(), PowerModel()):
         whole = identify(log, scara(), model, estimator=ESTIMATORS.create("WLS"))
         held = identify(log, scara().holding(ZZR1=3.5, Fs2=0.2), model, estimator=ESTIMATORS.create("WLS"))
@@ -147,14 +159,12 @@ def test_a_parameter_that_is_held_counts_as_known():
 
 
 def test_temperature_is_a_column_of_the_log():
-    (_, qd, _), t = motion()
+    _, t = motion()
     above = 20 * (1 - np.exp(-t / 10))
     log = made(lambda q, qd, load: -0.01 * above * qd, temperature=np.tile(25 + above[:, None], 2))
-    found = identify(log, scara() + BLOCKS.create("temperature"), ExplicitModel(), estimator=ESTIMATORS.create("WLS"))
-    values = dict(zip(found.names, found.X, strict=True))
+    values = estimates(log, scara() + BLOCKS.create("temperature"), ("FvT1", "FsT2"))
     assert values["FvT1"] == pytest.approx(-0.01, rel=0.02)
     assert values["FsT2"] == pytest.approx(0, abs=1e-3)
-    del qd
     with pytest.raises(LogError, match="does not say the temperature that a law needs"):
         identify(made(stribeck_law), scara() + BLOCKS.create("temperature"), ExplicitModel())
 
@@ -171,13 +181,12 @@ def test_parts_and_runs_keep_their_conditions():
 @pytest.mark.thorough
 @pytest.mark.parametrize(
     ("name", "law"),
-    [("stribeck", stribeck_law), ("load", SHAPED["load"][0]), ("offset", SHAPED["offset"][0]), ("", lambda q, qd, load: 0 * q)],
+    [("stribeck", stribeck_law), ("load", SHAPED["load"][0]), ("offset", SHAPED["offset"][0]), ("", no_law)],
 )
 def test_the_law_of_a_robot_is_chosen(name, law):
     candidates = {each: BLOCKS.create(each) for each in ("offset", "asymmetric-viscous", "load", "stribeck", "arctan")}
     for seed in range(2):
-        problem = Problem((made(law, 0.02, seed),), scara(), ExplicitModel(), idbench_chain())
-        found = choose_friction(problem, candidates)
+        found = choose_friction(problem_of(law, seed=seed), candidates)
         assert found.laws == ((name,) if name else (),) * 2, [s for s in found.scores if s.taken]
 
 
@@ -188,19 +197,12 @@ def test_the_load_is_all_torque_but_friction():
     np.testing.assert_allclose(load, rigid(q, qd, qdd) - X[[1, 6]][:, None] * qd - X[[2, 7]][:, None] * np.sign(qd), atol=1e-12)
 
 
-def test_a_law_with_known_shapes_is_linear():
-    found = identify(made(stribeck_law), scara() + StribeckFriction(vs=np.array([[0.3], [0.25]])), ExplicitModel())
-    assert found.X[-2:] == pytest.approx([0.3, 0.15], rel=0.02)
-
-
 @pytest.mark.thorough
 @pytest.mark.parametrize("smooth", [True, False])
 def test_friction_without_a_jump_takes_the_place_of_coulomb(smooth):
     """Where no mask takes the instants at rest, in which alone the two differ."""
-    law = (
-        (lambda q, qd, load: X[[2, 7]][:, None] * (np.tanh(qd / 0.05) - np.sign(qd))) if smooth else (lambda q, qd, load: 0 * q)
-    )
-    problem = Problem((made(law, 0.02),), scara(), ExplicitModel(), replace(idbench_chain(), mask=NoMask()))
+    law = (lambda q, qd, load: X[[2, 7]][:, None] * (np.tanh(qd / 0.05) - np.sign(qd))) if smooth else no_law
+    problem = replace(problem_of(law), chain=replace(idbench_chain(), mask=NoMask()))
     found = choose_friction(problem, {each: BLOCKS.create(each) for each in ("offset", "stribeck", "tanh")})
     assert found.laws == (("tanh",),) * 2 if smooth else ((), ())
     assert found.idle == (("Fs",),) * 2 if smooth else ((), ())
@@ -208,24 +210,20 @@ def test_friction_without_a_jump_takes_the_place_of_coulomb(smooth):
 
 def test_a_law_whose_shape_the_motion_leaves_open_is_not_chosen():
     """Arctan of a velocity above those of the log, about whose size nothing is known: it stands in for viscous friction."""
-    problem = Problem((made(lambda q, qd, load: -0.02 * qd**3, 0.02),), scara(), ExplicitModel(), idbench_chain())
+    problem = problem_of(lambda q, qd, load: -0.02 * qd**3)
     assert choose_friction(problem, {"arctan": BLOCKS.create("arctan")}).laws == ((), ())
 
 
 def test_friction_that_falls_beyond_the_speeds_of_the_log_is_seen():
     """Viscous friction of 0.1, and of -0.7, beyond that of the robot."""
-    rising, falling = (
-        Problem((made(lambda q, qd, load, a=a: a * qd, 0.02),), scara(), ExplicitModel(), idbench_chain()) for a in (0.1, -0.7)
-    )
+    rising, falling = (problem_of(lambda q, qd, load, a=a: a * qd) for a in (0.1, -0.7))
     assert [falls(rising, j) for j in (0, 1)] == [False, False]
     assert [falls(falling, j) for j in (0, 1)] == [True, True]
 
 
 def test_a_law_that_makes_friction_fall_beyond_the_log_is_not_chosen():
     """Viscous friction that fades as |qd| grows: arctan about 1 rad/s and a negative Fv explain it."""
-    problem = Problem(
-        (made(lambda q, qd, load: 2 * np.arctan(qd / 1.0) - 1.2 * qd, 0.02),), scara(), ExplicitModel(), idbench_chain()
-    )
+    problem = problem_of(lambda q, qd, load: 2 * np.arctan(qd / 1.0) - 1.2 * qd)
     candidates = {"arctan": BLOCKS.create("arctan")}
     plain = settled(problem.with_basis(scara() + candidates["arctan"]))
     assert all(falls(plain, j) for j in (0, 1))

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import builders
 import numpy as np
 import pytest
 
@@ -10,12 +11,10 @@ from idbench.identify import (
     CHAINS,
     ESTIMATORS,
     MODELS,
-    MotionLog,
     NoMask,
     Problem,
     ReversalMask,
     Rows,
-    TorqueChannel,
     WeightedLeastSquares,
     idbench_chain,
     identify_each,
@@ -28,26 +27,26 @@ from idbench.identify.rows.rows import is_long, manageable, piece_of
 
 @pytest.fixture
 def short(monkeypatch):
-    """Logs of more than 1000 samples of two joints count as long, pieces have 500 samples."""
+    """Logs of more than 1000 samples of two joints count as long, pieces have 500 samples, until what is returned is called."""
     monkeypatch.setattr(idbench.identify.rows.rows, "LONG", 4000)
     monkeypatch.setattr(idbench.identify.rows.rows, "PIECE", 2000)
+    return lambda: monkeypatch.setattr(idbench.identify.rows.rows, "LONG", 1e9)
 
 
 @pytest.fixture
-def noisy(log, rng):
-    tau = log.tau + [0.05, 0.0025] * rng.standard_normal(log.tau.shape)
-    return MotionLog(log.fs, log.q, tau, TorqueChannel("instantaneous"))
+def noisy(log):
+    return builders.noisy(log, 0, [0.05, 0.0025])
 
 
 MODEL = {name: MODELS.create(name) for name in MODELS.builtin}
 
 
 @pytest.mark.parametrize("estimator", ["OLS", "WLS", "GLS"])
-def test_estimates_are_those_of_all_rows(estimator, noisy, short, monkeypatch):
+def test_estimates_are_those_of_all_rows(estimator, noisy, short):
     solver = ESTIMATORS.create(estimator)
     assert is_long([noisy])
     cut = identify_each(noisy, scara(), MODEL, estimator=solver)
-    monkeypatch.setattr(idbench.identify.rows.rows, "LONG", 1e9)
+    short()
     whole = identify_each(noisy, scara(), MODEL, estimator=solver)
     for name, estimate in whole.items():
         found = cut[name]
@@ -62,12 +61,12 @@ def test_estimates_are_those_of_all_rows(estimator, noisy, short, monkeypatch):
 
 
 @pytest.mark.parametrize("chain", CHAINS.builtin)
-def test_pieces_have_the_rows_of_the_log(chain, noisy, short, monkeypatch):
+def test_pieces_have_the_rows_of_the_log(chain, noisy, short):
     """All of chain idbench, whose memory ends; those of an IIR filter to what it forgets: 1 %."""
     made, model = CHAINS.create(chain), MODELS.create("implicit")
     made = made if made.mask == NoMask() else replace(made, mask=ReversalMask(0.1))  # whose speeds do not follow a piece
     cut = [noisy.part(*piece) for piece in made.pieces(noisy, piece_of(noisy))]
-    monkeypatch.setattr(idbench.identify.rows.rows, "LONG", 1e9)
+    short()
     by_piece = Rows.stack([Problem((piece,), scara(), model, made).rows for piece in cut])
     whole = Problem((noisy,), scara(), model, made).rows
     assert by_piece.W.shape == whole.W.shape
@@ -75,21 +74,21 @@ def test_pieces_have_the_rows_of_the_log(chain, noisy, short, monkeypatch):
     np.testing.assert_allclose(by_piece.W / scale, whole.W / scale, atol=1e-9 if chain == "idbench" else 0.05)
 
 
-def test_a_trim_of_its_own_is_kept(noisy, short, monkeypatch):
+def test_a_trim_of_its_own_is_kept(noisy, short):
     made = replace(idbench_chain(), trim=3.0)
     cut = Problem((noisy,), scara(), MODELS.create("explicit"), made).factors
-    monkeypatch.setattr(idbench.identify.rows.rows, "LONG", 1e9)
+    short()
     whole = Problem((noisy,), scara(), MODELS.create("explicit"), made).factors
     np.testing.assert_array_equal(cut.rows, whole.rows)
     squares, expected = (np.swapaxes(factors.R, -1, -2) @ factors.R for factors in (cut, whole))
     np.testing.assert_allclose(squares, expected, atol=1e-9 * np.abs(expected).max())
 
 
-def test_a_fit_of_several_long_logs_is_that_of_all_their_rows(noisy, short, monkeypatch):
+def test_a_fit_of_several_long_logs_is_that_of_all_their_rows(noisy, short):
     parts = [noisy.part(0, 2400), noisy.part(2200, 4600)]
     weighted = WeightedLeastSquares()  # GLS takes pieces for independent
     cut = identify_each(parts, scara(), MODEL, estimator=weighted)
-    monkeypatch.setattr(idbench.identify.rows.rows, "LONG", 1e9)
+    short()
     whole = identify_each(parts, scara(), MODEL, estimator=weighted)
     for name in ("explicit", "implicit"):
         assert cut[name].row_count == whole[name].row_count

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from builders import noisy
 
 from idbench.identify import (
     MODELS,
@@ -41,18 +42,17 @@ def scenario(**changes):
     return replace(load("ideal"), trajectory=moves, **changes)
 
 
+def run(log, k):
+    """Return one run of several."""
+    return MotionLog(log.fs, log.q[k], log.tau[k], log.torque)
+
+
 @pytest.fixture(scope="module")
 def exact():
     """A held command, exact positions, of 12 motions."""
     base = scenario()
     motions = [replace(base.trajectory, seed=100 + i).sample(base.real_robot, base.fs) for i in range(RUNS)]
     return simulate(base, range(RUNS), motions=motions).log
-
-
-def noisy(log, position, torque):
-    rng = np.random.default_rng(5)
-    q, tau = (x + s * rng.standard_normal(x.shape) for x, s in ((log.q, position), (log.tau, torque)))
-    return MotionLog(log.fs, q, tau, log.torque)
 
 
 def test_cubic_polynomials_are_those_of_their_ends():
@@ -130,9 +130,7 @@ def test_friction_a_hundred_times_larger_than_what_moves_a_joint(coulomb, truth)
     """As of geared arms: where its sign is not known, velocities would swing between the counts, and no fit converge."""
     made = scenario(friction=replace(load("ideal").friction, coulomb=coulomb))
     log = simulate(made).alone()
-    rng = np.random.default_rng(0)
-    tau = log.tau + np.array([3.0, 0.5]) * rng.standard_normal(log.tau.shape)
-    log = MotionLog(log.fs, log.q + BITS16 * rng.standard_normal(log.q.shape), tau, log.torque)
+    log = noisy(log, BITS16, [3.0, 0.5], rng=0)
     found, true = identify(log, scara(), EXPLICIT, estimator=ML), truth.copy()
     true[[2, 7]] = coulomb
     assert (np.abs(found.X - true) < 4 * found.own_sigma).all()
@@ -149,8 +147,7 @@ def test_a_stated_delay_is_taken_into_account(delay, truth):
 
 
 def test_two_logs_are_worth_two(exact):
-    one, two = (MotionLog(exact.fs, *(x[k] for x in (exact.q, exact.tau)), exact.torque) for k in (0, 1))
-    one, two = noisy(one, BITS16, 0.02), noisy(two, BITS16, 0.02)
+    one, two = (noisy(run(exact, k), BITS16, 0.02) for k in (0, 1))
     both = identify([one, two], scara(), EXPLICIT, estimator=ML)
     alone = [identify(log, scara(), EXPLICIT, estimator=ML) for log in (one, two)]
     together = 1 / np.sqrt(sum(1 / found.own_sigma**2 for found in alone))
@@ -158,8 +155,7 @@ def test_two_logs_are_worth_two(exact):
 
 
 def test_other_models_are_refused_and_leave_the_explicit_one(exact):
-    log = MotionLog(exact.fs, exact.q[0], exact.tau[0], exact.torque)
-    problem = Problem((noisy(log, BITS16, 0.0),), scara(), EXPLICIT, idbench_chain())
+    problem = Problem((noisy(run(exact, 0), BITS16, 0.0),), scara(), EXPLICIT, idbench_chain())
     found = attempt_each(problem, {name: MODELS.create(name) for name in MODELS.builtin}, ML)
     assert found["explicit"].X.shape == (8,)
     assert "--model explicit, or GLS" in str(found["power"])
@@ -168,20 +164,20 @@ def test_other_models_are_refused_and_leave_the_explicit_one(exact):
 def test_logs_too_long_for_their_motion_are_refused(exact, monkeypatch):
     monkeypatch.setattr(maximum_likelihood, "MAX_BYTES", 1e6)
     with pytest.raises(IdentificationError, match=r"together take .* GB: use GLS, or at most \d+ samples"):
-        identify(MotionLog(exact.fs, exact.q[0], exact.tau[0], exact.torque), scara(), EXPLICIT, estimator=ML)
+        identify(run(exact, 0), scara(), EXPLICIT, estimator=ML)
 
 
 def test_the_smoothed_motion_is_true_within_its_sigma(truth):
     """Positions and velocities of a simulated motion, at its samples and between, away from the ends."""
-    run = simulate(scenario())
-    log = noisy(run.log, BITS16, 0.001)
+    made = simulate(scenario())
+    log = noisy(made.log, BITS16, 0.001)
     estimate = identify(log, scara(), EXPLICIT, estimator=ML)
     motion = smoothed_motion(estimate.fits[(0,)])
     inner, count = slice(20, -20), len(motion.t)
-    for found, sigma, true in ((motion.q, motion.sigma_q, run.q[0]), (motion.qd, motion.sigma_qd, run.qd[0])):
+    for found, sigma, true in ((motion.q, motion.sigma_q, made.q[0]), (motion.qd, motion.sigma_qd, made.qd[0])):
         z = ((found - true[:count]) / sigma)[inner]
         assert np.sqrt(np.mean(z**2)) == pytest.approx(1, abs=0.3)
-    raw, true = np.gradient(log.q[0], 1 / log.fs, axis=0)[:count], run.qd[0][:count]
+    raw, true = np.gradient(log.q[0], 1 / log.fs, axis=0)[:count], made.qd[0][:count]
     assert np.std((motion.qd - true)[inner, 0]) < 0.8 * np.std((raw - true)[inner, 0])
     between = smoothed_motion(estimate.fits[(0,)], t=np.array([3.003, 3.0071]))
     assert between.q.shape == (2, 2)
@@ -215,17 +211,6 @@ def test_the_delay_is_found_with_the_parameters(stated, truth):
     assert abs(stated + fit.delay - 0.004) < 5 * sigma
     assert smoothed_log(fit).torque.delay == pytest.approx(stated + fit.delay)
     assert (np.abs(found.X - truth) < 5 * found.own_sigma).all()
-
-
-def test_one_run_does_not_take_the_others_away(exact):
-    """Of two runs one has no torques that move it: the other is as it is alone."""
-    log = noisy(MotionLog(exact.fs, exact.q[:2], exact.tau[:2], exact.torque), BITS16, 0.01)
-    tau = np.stack([log.tau[0], np.zeros_like(log.tau[1])])
-    both = MotionLog(log.fs, log.q, tau, log.torque)
-    found = identify(both, scara(), EXPLICIT, estimator=ML, throw=False)
-    alone = identify(MotionLog(log.fs, log.q[0], log.tau[0], log.torque), scara(), EXPLICIT, estimator=ML)
-    np.testing.assert_array_equal(found.X[0], alone.X)
-    assert np.isnan(found.X[1]).all()
 
 
 @pytest.mark.thorough

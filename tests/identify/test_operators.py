@@ -109,13 +109,6 @@ def test_rows_look_no_further_than_the_halo(operator):
     assert changed[reach].max() <= remembered * changed.max()
 
 
-def test_rows_are_ordered_by_time_then_row(operator):
-    found = at(operator, sentence())
-    assert list(found.group[:4]) == [0, 1, 0, 1]
-    assert (np.diff(found.time.reshape(-1, 2), axis=0) > 0).all()
-    assert found.time[0] >= TRIM - 1e-9
-
-
 def test_leading_axes_are_independent_runs_with_the_same_bits(operator, rng):
     y = rng.normal(size=(3, 2, len(T)))
     one, weight = sentence(), (rng.uniform(size=(3, 2, len(T))) > 0.02).astype(float)

@@ -4,28 +4,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from builders import closed
 
 from idbench.identify import ESTIMATORS, ExplicitModel, identify, scara
 from idbench.identify.estimators import IterativelyReweighted
 from idbench.identify.signals.wild_samples import without_wild_samples
-from idbench.sim.encoders import IncrementalEncoder
-from idbench.sim.engine.simulation import simulate
 from idbench.sim.scenario.measurement import TorqueMeasurement
-from idbench.sim.scenario.scenario_file import load
-from idbench.sim.trajectories import RandomMoves
-
-
-def logged(bits, runs=1, **parts):
-    """Return the log of a closed loop with an encoder."""
-    moves = RandomMoves(moves=12, durations=(1.3, 1.3), rest=0.7, seed=1)
-    scenario = replace(load("ideal"), trajectory=moves, encoder=IncrementalEncoder(lines=2 ** (bits - 2)), **parts)
-    return simulate(scenario, range(runs)).log
 
 
 @pytest.fixture(scope="module")
 def noisy():
     """Eight logs with torque noise, and the same with one sample in fifty off: torques by 50 N m, positions by a degree."""
-    rng, log = np.random.default_rng(3), logged(16, 8, torque=TorqueMeasurement(noise=(0.05, 0.005)))
+    rng, (_, log) = np.random.default_rng(3), closed(16, 8, torque=TorqueMeasurement(noise=(0.05, 0.005)))
     where = [rng.random(log.q.shape) < 0.02 for _ in range(2)]
     tau = log.tau + where[0] * rng.uniform(-50, 50, log.tau.shape) * [1.0, 0.1]
     return log, replace(log, tau=tau), replace(log, tau=tau, q=log.q + where[1] * rng.uniform(-0.017, 0.017, log.q.shape))

@@ -1,7 +1,9 @@
 """What is roughly known: rows of the normal equations, of every linear estimator."""
 
+import builders
 import numpy as np
 import pytest
+from builders import arm
 
 from idbench.identify import (
     ESTIMATORS,
@@ -19,22 +21,18 @@ from idbench.identify.data.kinematics import INERTIAL
 from idbench.identify.parameters.bodies import inertial, pseudo_inertia
 from idbench.identify.parameters.prior import FilePrior, evident_sizes, normal_prior, prior_sum
 from idbench.identify.rows.factors import prior_rows
-from idbench.sim.robot.robot import Robot
-from idbench.sim.robot.tree import kinematic_tree, standard_parameters
 
 LINEAR = ["OLS", "WLS", "GLS"]
 
 
 @pytest.fixture(scope="module")
 def grouping():
-    tree = kinematic_tree(Robot.load("scara"))
-    return BaseParameters.of(tree, tree_basis(tree))
+    return arm("scara").grouping
 
 
 @pytest.fixture(scope="module")
-def values(grouping):
-    true = standard_parameters(Robot.load("scara"))
-    return np.array([true[name] for name in grouping.standard.names])
+def values():
+    return arm("scara").X
 
 
 def problem_of(log, grouping, prior=None):
@@ -43,8 +41,7 @@ def problem_of(log, grouping, prior=None):
 
 @pytest.fixture(scope="module")
 def noisy(log):
-    rng = np.random.default_rng(4)
-    return MotionLog(log.fs, log.q, log.tau + [0.5, 0.025] * rng.standard_normal(log.tau.shape), log.torque)
+    return builders.noisy(log, 0, [0.5, 0.025], rng=4)
 
 
 @pytest.mark.parametrize("acronym", LINEAR)
@@ -79,8 +76,7 @@ def test_sigma_is_right_where_the_prior_is(log, grouping, values):
     for _ in range(200):
         believed = true[places] + sigma * rng.standard_normal(len(places))
         prior = normal_prior(np.eye(8)[:, places], believed, sigma)
-        tau = short.tau + [5.0, 0.25] * rng.standard_normal(short.tau.shape)
-        one = MotionLog(log.fs, short.q, tau, log.torque)
+        one = builders.noisy(short, 0, [5.0, 0.25], rng=rng)
         found = estimate(problem_of(one, grouping, prior), ESTIMATORS.create("GLS"))
         z.append((found.X - true) / found.noise_sigma)
     assert np.sqrt(np.mean(np.square(z))) == pytest.approx(1.0, abs=0.15)
@@ -203,7 +199,7 @@ def test_sizes_are_those_that_parameters_were_drawn_with():
 
 def test_a_joint_that_turned_one_way_has_friction_where_the_others_show_no_offset(noisy, values):
     """Joint 2 always forwards: Fs2 and off2 make the same column; joint 1 shows an offset of 0, or one of 5 N m."""
-    tree = kinematic_tree(Robot.load("scara"))
+    tree = arm("scara").tree
     grouping = BaseParameters.of(tree, tree_basis(tree, (ViscousFriction(), CoulombFriction(), Offset())))
     standard, names = grouping.standard, grouping.names
     given = np.array([dict(zip(tree_basis(tree).names, values, strict=True)).get(name, 0.0) for name in standard.names])

@@ -1,5 +1,6 @@
 """Recursive least squares, against least squares of the rows so far."""
 
+import builders
 import numpy as np
 import pytest
 
@@ -17,8 +18,7 @@ from idbench.identify import (
 
 @pytest.fixture(scope="module")
 def noisy(log):
-    rng = np.random.default_rng(1)
-    return MotionLog(log.fs, log.q, log.tau + 0.1 * rng.standard_normal(log.tau.shape), log.torque)
+    return builders.noisy(log, 0, 0.1)
 
 
 @pytest.mark.parametrize("estimator", ["OLS", "WLS", "GLS"])

@@ -1,9 +1,8 @@
 """Maximum likelihood through reversals, on logs of another simulator."""
 
-import importlib.util
 from functools import cache
-from pathlib import Path
 
+import exact_scara as exact
 import numpy as np
 import pytest
 from scipy.linalg import lapack
@@ -26,10 +25,6 @@ from idbench.identify.noise.band_matrix import solve_lower
 
 EXPLICIT, HELD, FS, RUNS = MODELS.create("explicit"), TorqueChannel("held"), 100.0, 16
 MASKED, USED = MaximumLikelihood(), MaximumLikelihood(reversals=True)
-
-_spec = importlib.util.spec_from_file_location("exact_scara", Path(__file__).parent / "exact_scara.py")
-exact = importlib.util.module_from_spec(_spec)
-_spec.loader.exec_module(exact)
 
 LAWS = {
     "coulomb": {},

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from builders import noisy
 
 from idbench.identify import (
     ESTIMATORS,
@@ -128,6 +129,10 @@ def test_a_delay_is_found_to_60_microseconds(seed, late):
     assert abs(found.delay + late) < 3 * found.doubt
 
 
+def problem_of(log):
+    return Problem((log,), scara(), ExplicitModel(), idbench_chain())
+
+
 def stiction(log, size, rng):
     """Return a log whose joint 2 sticks: of another size after each reversal, in multiples of its Coulomb friction."""
     qd = np.gradient(log.q[:, 1], 1 / log.fs)
@@ -138,23 +143,17 @@ def stiction(log, size, rng):
 
 
 def test_stiction_gets_a_wide_mask_and_coulomb_friction_does_not(log, rng):
-    noisy = replace(log, tau=log.tau + [0.05, 0.01] * rng.standard_normal(log.tau.shape))
-
-    def reach(one):
-        return suited_reach(Problem((one,), scara(), ExplicitModel(), idbench_chain()))
-
-    assert reach(noisy) == ()
-    assert reach(stiction(noisy, 20.0, rng))[1] > 0
+    plain = noisy(log, 0, [0.05, 0.01], rng=rng)
+    assert suited_reach(problem_of(plain)) == ()
+    assert suited_reach(problem_of(stiction(plain, 20.0, rng)))[1] > 0
 
 
 def test_of_a_log_whose_rows_are_not_kept_the_beginning_decides(log, rng, monkeypatch):
     """And nothing of the size of all its rows is made."""
-    noisy = replace(log, tau=log.tau + [0.05, 0.01] * rng.standard_normal(log.tau.shape))
-    sticky = stiction(noisy, 20.0, rng)
+    sticky = stiction(noisy(log, 0, [0.05, 0.01], rng=rng), 20.0, rng)
     monkeypatch.setattr("idbench.identify.rows.rows.LONG", 0.75 * log.samples * log.n**2)
-    long = Problem((sticky,), scara(), ExplicitModel(), idbench_chain())
+    long, beginning = problem_of(sticky), problem_of(sticky.part(0, int(0.75 * log.samples)))
     assert long.long
-    beginning = Problem((sticky.part(0, int(0.75 * log.samples)),), scara(), ExplicitModel(), idbench_chain())
     assert suited_reach(long) == suited_reach(beginning)
 
 
@@ -166,21 +165,3 @@ def test_a_log_too_short_for_10_hz_keeps_its_fit(log):
     assert np.isfinite(found.X).all()
     assert torque_interval(found) is None
     assert suited_reach(found.problem) == ()
-
-
-@pytest.mark.parametrize("apart", [0.0, 0.003])
-def test_logs_whose_delays_differ_are_said_to_differ(apart, log, rng):
-    """Sigma of one delay for both is then at least their scatter, apart / sqrt(2) for two, less what noise makes of it."""
-    each = []
-    for late in (0.002, 0.002 + apart):
-        tau = np.stack([np.interp(log.t - late, log.t, x) for x in log.tau.T], axis=1)
-        each.append(
-            MotionLog(log.fs, log.q, tau + [0.05, 0.005] * rng.standard_normal(tau.shape), TorqueChannel("instantaneous"))
-        )
-    found = estimate_delay(each, scara())
-    assert found.delay == pytest.approx(-0.002 - apart / 2, abs=2e-4)
-    assert bool(found.of_logs) == bool(apart)
-    assert ("the logs differ" in found.words) == bool(apart)
-    if apart:
-        np.testing.assert_allclose(found.of_logs, [-0.002, -0.005], atol=2e-4)
-        assert found.doubt > 0.9 * apart / np.sqrt(2)

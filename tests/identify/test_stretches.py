@@ -2,25 +2,23 @@
 
 import numpy as np
 import pytest
+from builders import arm
 
-from idbench.identify import CHAINS, MODELS, BaseParameters, tree_basis
+from idbench.identify import CHAINS, MODELS
 from idbench.identify.basis import tree_links
 from idbench.identify.basis.replay import PIECE
 from idbench.identify.estimators.problem import Problem
 from idbench.identify.rows import rows
 from idbench.identify.signals.signals import State
 from idbench.sim.engine.run import ideal_log
-from idbench.sim.robot.robot import Robot
-from idbench.sim.robot.tree import kinematic_tree
 from idbench.sim.trajectories import RandomMoves
 
 
 @pytest.fixture(scope="module")
 def two_links():
-    robot = Robot.load("two_link")
-    log = ideal_log(robot, RandomMoves(moves=8, durations=(0.8, 1.2), velocity=(2.0,), rest=0.3).sample(robot, 250.0))
-    tree = kinematic_tree(robot)
-    return log, BaseParameters.of(tree, tree_basis(tree)).basis
+    made = arm("two_link")
+    moves = RandomMoves(moves=8, durations=(0.8, 1.2), velocity=(2.0,), rest=0.3)
+    return ideal_log(made.robot, moves.sample(made.robot, 250.0)), made.grouping.basis
 
 
 @pytest.mark.parametrize("model", MODELS)
@@ -39,7 +37,7 @@ def test_stretches_make_the_rows_of_the_whole_log(two_links, model, chain, monke
 @pytest.mark.parametrize("function", ["explicit", "momentum", "remainder", "energy"])
 @pytest.mark.parametrize("shape", [(1,), (3,), (2, PIECE - 1), (2, 3, PIECE // 2 + 1)])
 def test_replayed_columns_are_the_formulas_of_numbers(function, shape, rng):
-    tree = kinematic_tree(Robot.load("puma560"))
+    tree = arm("puma560").tree
     q, qd, qdd = rng.normal(size=(3, *shape[:-1], tree.n, shape[-1]))
     state = State(q, qd, lambda _: qdd)
     found = getattr(tree_links.TreeLinks(tree), function)(state)

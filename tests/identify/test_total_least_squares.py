@@ -4,19 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from builders import closed
 
 from idbench.identify import ExplicitModel, IdentificationError, NoPrefilter, idbench_chain, identify, scara
 from idbench.identify.estimators import TotalLeastSquares
-from idbench.sim.encoders import IncrementalEncoder
-from idbench.sim.engine.simulation import simulate
-from idbench.sim.scenario.scenario_file import load
-from idbench.sim.trajectories import RandomMoves
 
 
 def test_total_least_squares_refuses_where_noise_hides_the_answer():
     """With ten bits up to 20 Hz columns of W are noise."""
-    moves = RandomMoves(moves=12, durations=(1.3, 1.3), rest=0.7, seed=1)
-    coarse = simulate(replace(load("ideal"), trajectory=moves, encoder=IncrementalEncoder(lines=256))).alone()
+    _, coarse = closed(10)
     chain = idbench_chain()
     wide = replace(chain, prefilter=NoPrefilter(), operator=replace(chain.operator, cutoff=20.0))
     with pytest.raises(IdentificationError, match="total least squares has no answer"):
@@ -29,7 +25,6 @@ def test_total_least_squares_is_that_of_the_textbook(rng):
 
     A = rng.standard_normal((200, 4))
     R, S = np.linalg.qr(A, mode="r"), 200 * 0.01 * np.eye(4)
-    v = np.linalg.svd(A)[2][-1]
     with pytest.raises(IdentificationError, match="no answer"):
         _solved(R, S)  # of random numbers there is none
     A[:, 3] = A[:, :3] @ [1.0, -2.0, 0.5] + 0.1 * rng.standard_normal(200)

@@ -9,13 +9,13 @@ from types import ModuleType
 import numpy as np
 import pinocchio as pin
 import pytest
+from builders import at, defects, matrix
 
 import idbench.identify.basis.tree_links
 from idbench.identify import Joint, KinematicTree, State, TreeLinks
 from idbench.identify.data.kinematics import INERTIAL
 
 TIMES = 25
-EPS = 1e-30
 
 PINOCCHIO = ("M", "MX", "MY", "MZ", "XX", "XY", "YY", "XZ", "YZ", "ZZ")
 """Pinocchio's order of a body's ten parameters, the inertia about the origin of its frame."""
@@ -25,32 +25,14 @@ def states(n, times=TIMES):
     return np.random.default_rng(2).uniform(-3, 3, (3, n, times))
 
 
-def matrix(columns, rows, names, times=TIMES):
-    """Return columns as a dense array, shape (time, row, parameter)."""
-    dense = np.zeros((times, rows, len(names)))
-    for (row, parameter), signal in columns.items():
-        dense[:, row, names.index(parameter.name)] = signal
-    return dense
-
-
 def order(n):
     return [f"{x}{j + 1}" for j in range(n) for x in PINOCCHIO]
-
-
-def at(q, qd, qdd):
-    return State(q, qd, lambda _: qdd)
-
-
-def rate(columns, q, qd, qdd):
-    """Return d/dt of columns by a complex step: exact to rounding."""
-    ahead = State(q + 1j * EPS * qd, qd + 1j * EPS * qdd, lambda _: None)
-    return {address: np.imag(signal) / EPS for address, signal in columns(ahead).items()}
 
 
 def test_explicit_columns_are_pinocchios_torque_regressor(peer):
     n, data = peer.tree.n, peer.model.createData()
     q, qd, qdd = states(n)
-    mine = matrix(TreeLinks(peer.tree).explicit(at(q, qd, qdd)), n, order(n))
+    mine = matrix(TreeLinks(peer.tree).explicit(at(q, qd, qdd)), n, order(n), TIMES)
     for k in range(TIMES):
         theirs = pin.computeJointTorqueRegressor(peer.model, data, q[:, k], qd[:, k], qdd[:, k])
         np.testing.assert_allclose(mine[k], theirs, atol=1e-10)
@@ -59,7 +41,7 @@ def test_explicit_columns_are_pinocchios_torque_regressor(peer):
 def test_energy_columns_are_pinocchios_energy_regressors(peer):
     n, data = peer.tree.n, peer.model.createData()
     q, qd, qdd = states(n)
-    mine = matrix(TreeLinks(peer.tree).energy(at(q, qd, qdd)), 1, order(n))
+    mine = matrix(TreeLinks(peer.tree).energy(at(q, qd, qdd)), 1, order(n), TIMES)
     for k in range(TIMES):
         kinetic = pin.computeKineticEnergyRegressor(peer.model, data, q[:, k], qd[:, k])
         potential = pin.computePotentialEnergyRegressor(peer.model, data, q[:, k])
@@ -70,7 +52,7 @@ def test_momentum_columns_are_the_mass_matrix_times_velocity(peer):
     n, data = peer.tree.n, peer.model.createData()
     q, qd, qdd = states(n)
     X = np.concatenate([inertia.toDynamicParameters() for inertia in peer.model.inertias[1:]])
-    mine = matrix(TreeLinks(peer.tree).momentum(at(q, qd, qdd)), n, order(n)) @ X
+    mine = matrix(TreeLinks(peer.tree).momentum(at(q, qd, qdd)), n, order(n), TIMES) @ X
     for k in range(TIMES):
         M = pin.crba(peer.model, data, q[:, k])
         np.testing.assert_allclose(mine[k], (np.triu(M) + np.triu(M, 1).T) @ qd[:, k], atol=1e-10)
@@ -92,23 +74,16 @@ def oblique():
     return KinematicTree("oblique", tuple(joints), [1.0, -2.0, -9.0])
 
 
-def defects(block):
-    """Return by how much explicit = s momentum + remainder and qd' explicit = s energy + dissipation fail."""
-    n = block.tree.n
-    q, qd, qdd = states(n)
-    state, names = at(q, qd, qdd), [p.name for p in block.parameters(n)]
-    D = matrix(block.explicit(state), n, names)
-    implicit = matrix(rate(block.momentum, q, qd, qdd), n, names) + matrix(block.remainder(state), n, names)
-    power = matrix(rate(block.energy, q, qd, qdd), 1, names)
-    return np.abs(D - implicit).max(), np.abs(np.einsum("jk,kjp->kp", qd, D) - power[:, 0]).max()
+def identities(block, n=6):
+    return defects(block, [p.name for p in block.parameters(n)], *states(n))
 
 
 def test_identities_of_a_tree_without_any_right_angle():
-    assert max(defects(TreeLinks(oblique()))) < 1e-9  # signals up to 1e4, rounding 1e-12
+    assert max(identities(TreeLinks(oblique()))) < 1e-9  # signals up to 1e4, rounding 1e-12
 
 
 def test_identities_of_other_peoples_arms(peer):
-    assert max(defects(TreeLinks(peer.tree))) < 1e-10
+    assert max(identities(TreeLinks(peer.tree), peer.tree.n)) < 1e-10
 
 
 def test_leading_axes_are_runs_and_narrowing_changes_no_bit(peer):
@@ -203,7 +178,7 @@ def test_any_sign_that_is_changed_is_noticed(peer, monkeypatch):
                     and all(np.allclose(mutated[f][a], right[f][a], atol=1e-12) for a in right[f])
                     for f in right
                 )
-                found = *defects(block(slanted)), pinocchio_defect(block(peer.tree), peer), zero_defect(block)
+                found = *identities(block(slanted)), pinocchio_defect(block(peer.tree), peer), zero_defect(block)
                 noticed = same or max(found) > 1e-6
             except (TypeError, ValueError, AttributeError, IndexError):
                 noticed = True  # no longer a program

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from builders import noisy
 
 from idbench.identify import (
     ExplicitModel,
@@ -69,9 +70,8 @@ def test_fits_with_any_mask_and_without_are_judged_on_the_same_rows(log, truth):
 def test_noise_is_told_by_its_rms_and_is_white(log, truth, rng):
     """A low-pass of unit gain leaves of white noise the share sum h^2."""
     sigma = np.array([0.5, 0.025])
-    noisy = MotionLog(log.fs, log.q, log.tau + sigma * rng.standard_normal(log.tau.shape), CHANNEL)
     chain = idbench_chain()
-    found = judged(noisy, truth)
+    found = judged(noisy(log, 0, sigma, rng=rng), truth)
     passed = np.sqrt(np.sum(chain.operator.response(log.fs) ** 2))
     # Rows of which the mask takes a part are smaller: at most as large as those of all.
     assert (found.rms < 1.1 * sigma * passed).all()
@@ -80,10 +80,7 @@ def test_noise_is_told_by_its_rms_and_is_white(log, truth, rng):
 
 def test_white_noise_is_mostly_called_white(log, truth):
     """In 95 % without a mask; rows beside masked ones correlate, which leaves 90 % (200 seeds), here of 80 to 3 %."""
-    white = []
-    for seed in range(40):
-        noise = [0.5, 0.025] * np.random.default_rng(seed).standard_normal(log.tau.shape)
-        white += list(judged(MotionLog(log.fs, log.q, log.tau + noise, CHANNEL), truth).white)
+    white = [judged(noisy(log, 0, [0.5, 0.025], rng=seed), truth).white for seed in range(40)]
     assert 0.8 < np.mean(white) < 1
 
 
@@ -115,8 +112,7 @@ def test_the_end_of_a_log_is_held_out(log):
 @pytest.mark.parametrize("sigma", [(0.5, 0.025), (0.05, 0.005)])
 def test_the_noise_of_a_log_is_read_off_above_its_band(log, truth, sigma):
     """White noise of the torques, by another route: what a low-pass of unit gain and the mask leave of it, to a fifth."""
-    noise = sigma * np.random.default_rng(5).standard_normal(log.tau.shape)
-    found = judged(MotionLog(log.fs, log.q, log.tau + noise, CHANNEL), truth)
+    found = judged(noisy(log, 0, sigma), truth)
     np.testing.assert_allclose(found.noise, found.rms, rtol=0.2)  # the truth leaves nothing else
     assert (found.excess == 0).all()
 
@@ -124,9 +120,8 @@ def test_the_noise_of_a_log_is_read_off_above_its_band(log, truth, sigma):
 def test_a_wrong_model_does_not_pass_for_noise(log, truth):
     """LMX2 too small by a tenth, on the noisy log: what is beyond noise is what it is without any."""
     wrong = truth * [1, 1, 1, 1, 0.9, 1, 1, 1]
-    noise = [0.05, 0.005] * np.random.default_rng(5).standard_normal(log.tau.shape)
-    noisy, exact = (judged(MotionLog(log.fs, log.q, log.tau + x, CHANNEL), wrong) for x in (noise, 0 * noise))
-    np.testing.assert_allclose(noisy.excess, exact.rms, rtol=0.05)
+    drawn, exact = (judged(one, wrong) for one in (noisy(log, 0, [0.05, 0.005]), log))
+    np.testing.assert_allclose(drawn.excess, exact.rms, rtol=0.05)
 
 
 def test_sigma_of_the_parameters_is_expected_too(log, truth):

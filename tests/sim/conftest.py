@@ -24,11 +24,18 @@ def short(ideal: Scenario) -> Scenario:
 
 
 @pytest.fixture
-def load_robot(tmp_path):
+def written(tmp_path):
+    """Return what writes a file of a robot, and gives its path."""
+
+    def write(text, name="arm.xml"):
+        path = tmp_path / name
+        path.write_text(text)
+        return str(path)
+
+    return write
+
+
+@pytest.fixture
+def load_robot(written):
     """Return what reads a robot out of the text of a file."""
-
-    def read(text, *edits, name="arm.urdf"):
-        (tmp_path / name).write_text(text)
-        return Robot.load(str(tmp_path / name), *edits)
-
-    return read
+    return lambda text, *edits, name="arm.xml": Robot.load(written(text, name), *edits)

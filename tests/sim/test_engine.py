@@ -233,14 +233,13 @@ def test_impossible_times_are_told(short, change, message):
         simulate(replace(short, **change))
 
 
-def test_a_robot_of_one_joint_runs(tmp_path, short):
-    path = tmp_path / "pendulum.xml"
-    path.write_text(
+def test_a_robot_of_one_joint_runs(written, short):
+    path = written(
         '<mujoco><option gravity="0 0 -9.81"/><worldbody><body><inertial pos="0.3 0 0" mass="1" diaginertia="0.1 0.1 0.1"/>'
         '<joint name="hip" axis="0 1 0" damping="0.1"/></body></worldbody></mujoco>'
     )
     moves = Quintic(((0.0,), (1.0,), (-0.5,)), (1.0, 1.0), 0.2)
-    run = simulate(replace(short, robot=str(path), trajectory=moves))
+    run = simulate(replace(short, robot=path, trajectory=moves))
     assert np.abs(run.reference.q - run.q[0]).max() < 0.02
     gravity = -9.81 * 0.3 * np.cos(run.q[0, 0, 0])  # about y, a positive angle lowers the arm
     np.testing.assert_allclose(run.command[0, 0, 0], gravity, atol=1e-9)

@@ -1,8 +1,8 @@
 """Tables of Denavit and Hartenberg, of both conventions, as robots."""
 
-import mujoco
 import numpy as np
 import pytest
+from builders import forward
 
 from idbench.sim.errors import RobotError
 from idbench.sim.robot.mounting import Mounting
@@ -36,9 +36,7 @@ def test_a_table_of_khalil_and_kleinfinger(load_robot):
         turn, way = (theta + q[j], r) if j < 3 else (theta, r + q[j])
         ca, sa, ct, st = np.cos(alpha), np.sin(alpha), np.cos(turn), np.sin(turn)
         place = place @ [[ct, -st, 0, d], [ca * st, ca * ct, -sa, -way * sa], [sa * st, sa * ct, ca, way * ca], [0, 0, 0, 1]]
-    data = mujoco.MjData(robot.model)
-    data.qpos[:] = q
-    mujoco.mj_forward(robot.model, data)
+    data = forward(robot, q)
     np.testing.assert_allclose(data.xpos[-1], place[:3, 3], atol=1e-12)
     np.testing.assert_allclose(data.xmat[-1].reshape(3, 3), place[:3, :3], atol=1e-12)
     assert robot.weightless
@@ -56,9 +54,7 @@ def test_a_classic_table_moves_as_the_puma_of_corke(load_robot):
     for (alpha, a, d), theta in zip(rows, q, strict=True):
         ca, sa, ct, st = np.cos(np.radians(alpha)), np.sin(np.radians(alpha)), np.cos(theta), np.sin(theta)
         place = place @ [[ct, -st * ca, st * sa, a * ct], [st, ct * ca, -ct * sa, a * st], [0, sa, ca, d], [0, 0, 0, 1]]
-    data = mujoco.MjData(robot.model)
-    data.qpos[:] = q
-    mujoco.mj_forward(robot.model, data)
+    data = forward(robot, q)
     np.testing.assert_allclose(data.xpos[-1], place[:3, 3], atol=1e-12)  # the wrist's axes meet: a and d of the last are 0
 
 
@@ -80,9 +76,8 @@ def test_a_table_that_makes_no_sense_is_told(load_robot, change, message):
         load_robot(KHALIL.replace(*change), name="arm.toml")
 
 
-def test_a_table_and_a_held_robot_are_written_as_mjcf(tmp_path):
-    (tmp_path / "arm.toml").write_text(KHALIL)
-    (tmp_path / "out.xml").write_text(rewritten(str(tmp_path / "arm.toml"), {"M4": 2.0, "XX4": 0.5, "YY4": 0.5, "ZZ4": 0.5}))
+def test_a_table_and_a_held_robot_are_written_as_mjcf(written, tmp_path):
+    (tmp_path / "out.xml").write_text(rewritten(written(KHALIL, "arm.toml"), {"M4": 2.0, "XX4": 0.5, "YY4": 0.5, "ZZ4": 0.5}))
     assert Robot.load(str(tmp_path / "out.xml")).model.body_mass[-1] == pytest.approx(2.0)
     mounting = Mounting(lock=((Robot.load("panda").joints[6], 0.5),))
     (tmp_path / "held.xml").write_text(rewritten("panda", {}, tmp_path, mounting))

@@ -1,7 +1,5 @@
 """What a motion must keep: distances, floors, boxes, and limits from files."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -9,7 +7,6 @@ from idbench.sim.errors import RobotError, ScenarioError
 from idbench.sim.limits.clearance import Clearance
 from idbench.sim.limits.motion_limits import KeepOut, MotionLimits, home_position, limits_of, surroundings
 from idbench.sim.robot.robot import Robot
-from idbench.sim.trajectories import Fourier
 
 BALLS = """
 <mujoco><compiler angle="radian"/><option gravity="0 0 0"/><worldbody>
@@ -28,10 +25,8 @@ URDF = """
 
 
 @pytest.fixture
-def balls(tmp_path):
-    path = tmp_path / "balls.xml"
-    path.write_text(BALLS)
-    return str(path)
+def balls(written):
+    return written(BALLS)
 
 
 @pytest.fixture
@@ -95,14 +90,12 @@ def test_shipped_arms_are_clear_at_home():
         assert not clearance.left_out
 
 
-def test_a_urdf_says_velocities_and_efforts_but_has_no_shapes(tmp_path):
-    path = tmp_path / "arm.urdf"
-    path.write_text(URDF)
-    robot = Robot.load(str(path))
+def test_a_urdf_says_velocities_and_efforts_but_has_no_shapes(written):
+    robot = Robot.load(path := written(URDF, "arm.urdf"))
     bounds = limits_of(robot, MotionLimits())
     assert bounds.velocity.tolist() == [2.5]
     assert bounds.torque.tolist() == [33.0]
-    assert not Clearance(surroundings(str(path), MotionLimits()), bounds.position, 0.01).checks
+    assert not Clearance(surroundings(path, MotionLimits()), bounds.position, 0.01).checks
 
 
 @pytest.mark.parametrize(
@@ -155,34 +148,3 @@ def test_wrong_limits_are_told(tmp_path, text, message):
     assert message in str(error.value)
     with pytest.raises(ScenarioError, match="cannot read limits"):
         MotionLimits.read(tmp_path / "nowhere.toml")
-
-
-SERIES = Fourier(period=4.0, middle=(0.1, 0.2), sines=((0.3, 0.2), (0.1, -0.1)), cosines=((0.0, 0.1), (0.2, 0.0)), fade=1.0)
-
-
-@pytest.mark.parametrize("series", [SERIES, Fourier(), replace(Fourier(), repeat=3)], ids=["fading", "at rest", "three times"])
-def test_a_series_moves_as_its_derivatives_say(robot, series):
-    motion = series.plan(robot)
-    t, h = np.linspace(series.rest + 0.01, motion.duration - series.rest - 0.01, 500), 1e-6
-    before, here, after = (motion.at(t + d, 1.0) for d in (-h, 0.0, h))
-    np.testing.assert_allclose((after.q - before.q) / (2 * h), here.qd, atol=1e-7)
-    np.testing.assert_allclose((after.qd - before.qd) / (2 * h), here.qdd, atol=1e-6)
-    ends = motion.at(np.array([0.0, series.rest, motion.duration - series.rest, motion.duration + 1]), 1.0)
-    np.testing.assert_allclose(ends.qd, 0.0, atol=1e-9)
-
-
-def test_a_series_is_its_sum_in_the_middle(robot):
-    motion = replace(SERIES, repeat=2).plan(robot)
-    t = np.array([0.0, 0.7, 4.3])
-    w = 2 * np.pi / 4.0
-    one = 0.1 + 0.3 * np.sin(w * t) + 0.1 * np.sin(2 * w * t) + 0.2 * np.cos(2 * w * t)
-    np.testing.assert_allclose(motion.at(SERIES.rest + SERIES.fade + t, 1.0).q[:, 0], one)
-
-
-def test_a_series_that_does_not_rest_must_fade_in():
-    with pytest.raises(ScenarioError, match="does not begin at rest: give it a time to fade in"):
-        replace(SERIES, fade=0.0)
-    with pytest.raises(ScenarioError, match="needs 2 coefficients"):
-        replace(SERIES, sines=((0.1,), (0.2,)))
-    with pytest.raises(ScenarioError, match="give as many of both"):
-        replace(SERIES, sines=((0.1, 0.2),))

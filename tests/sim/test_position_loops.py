@@ -7,7 +7,6 @@ import pytest
 from idbench.identify.files.servo_file import ServoFile
 from idbench.identify.servo.law import TimeSteps
 from idbench.sim.robot.position_loops import position_loops
-from idbench.sim.robot.robot import Robot
 from idbench.sim.robot.time_steps import steps_of
 
 ARM = """
@@ -26,10 +25,9 @@ ACTUATORS = [
 ]
 
 
-def robot_of(tmp_path, actuator, integrator="Euler"):
-    path = tmp_path / "arm.xml"
-    path.write_text(ARM.format(actuator=actuator, integrator=integrator))
-    return Robot.load(str(path))
+@pytest.fixture
+def robot_of(load_robot):
+    return lambda actuator, integrator="Euler": load_robot(ARM.format(actuator=actuator, integrator=integrator))
 
 
 def torque(servo, loop, u, q, qd):
@@ -42,8 +40,8 @@ def torque(servo, loop, u, q, qd):
 
 
 @pytest.mark.parametrize("actuator", ACTUATORS)
-def test_loops_make_the_forces_of_mujoco(tmp_path, actuator):
-    robot = robot_of(tmp_path, actuator)
+def test_loops_make_the_forces_of_mujoco(robot_of, actuator):
+    robot = robot_of(actuator)
     (loop,) = position_loops(robot).values()
     assert loop.actuator == "a"
     servo = ServoFile({}, {"one": dict(loop.stated)}, {}).servo("one", "")
@@ -57,16 +55,16 @@ def test_loops_make_the_forces_of_mujoco(tmp_path, actuator):
         assert data.qfrc_actuator[0] == pytest.approx(expected, abs=1e-9)
 
 
-def test_motors_and_tendons_close_no_loop(tmp_path):
-    assert position_loops(robot_of(tmp_path, '<motor joint="one"/>')) == {}
-    assert position_loops(robot_of(tmp_path, '<intvelocity joint="one" kp="3" actrange="-1 1"/>')) == {}
+def test_motors_and_tendons_close_no_loop(robot_of):
+    assert position_loops(robot_of('<motor joint="one"/>')) == {}
+    assert position_loops(robot_of('<intvelocity joint="one" kp="3" actrange="-1 1"/>')) == {}
 
 
 @pytest.mark.parametrize(
     ("integrator", "expected"), [("Euler", (0.002, -0.002, 0.002)), ("implicitfast", (0.002, 0.002, 0.002)), ("RK4", (0, 0, 0))]
 )
-def test_what_integrators_take_late(tmp_path, integrator, expected):
-    steps = TimeSteps(*steps_of(robot_of(tmp_path, ACTUATORS[0], integrator))["one"])
+def test_what_integrators_take_late(robot_of, integrator, expected):
+    steps = TimeSteps(*steps_of(robot_of(ACTUATORS[0], integrator))["one"])
     assert steps[:3] == pytest.approx(expected)
     assert steps.step == 0.004
     assert steps.decay == pytest.approx(2 / (0.95 * 0.02))  # MuJoCo's own solref and solimp

@@ -2,9 +2,9 @@
 
 from importlib.metadata import files
 
-import mujoco
 import numpy as np
 import pytest
+from builders import forward
 
 from idbench.sim.errors import RobotError
 from idbench.sim.robot.inverse_dynamics import inverse_dynamics
@@ -28,6 +28,11 @@ def urdf(*links, joints="", head=""):
     return f'<robot name="r" {head}>{inside}{joints or made}</robot>'
 
 
+@pytest.fixture
+def load_urdf(written):
+    return lambda text, *edits: Robot.load(written(text, "arm.urdf"), *edits)
+
+
 @pytest.mark.parametrize(
     ("inertial", "note"),
     [
@@ -39,18 +44,18 @@ def urdf(*links, joints="", head=""):
     ],
     ids=["none", "no mass", "too long", "zero", "negative"],
 )
-def test_links_without_an_inertia_that_a_body_has_are_mended(load_robot, inertial, note):
+def test_links_without_an_inertia_that_a_body_has_are_mended(load_urdf, inertial, note):
     """The published TX40, TIAGo's antenna, a dozen of the URDFs of laboratories: identification needs places alone."""
-    robot = load_robot(urdf("", SOLID, inertial))
+    robot = load_urdf(urdf("", SOLID, inertial))
     assert robot.joints == ("j1", "j2")
     assert any(note in words for words in robot.notes)
-    assert load_robot(urdf("", SOLID, SOLID)).notes == ()
+    assert load_urdf(urdf("", SOLID, SOLID)).notes == ()
 
 
-def test_a_link_whose_mass_is_welded_to_it_is_left_alone(load_robot):
+def test_a_link_whose_mass_is_welded_to_it_is_left_alone(load_urdf):
     weld = '<joint name="w" type="fixed"><parent link="l1"/><child link="l2"/></joint>'
     turn = '<joint name="j" type="continuous"><parent link="l0"/><child link="l1"/><axis xyz="0 0 1"/></joint>'
-    robot = load_robot(urdf("", "", SOLID, joints=turn + weld))
+    robot = load_urdf(urdf("", "", SOLID, joints=turn + weld))
     assert robot.notes == ()
     assert robot.model.body_mass.sum() == pytest.approx(1.0)
 
@@ -62,17 +67,17 @@ def test_a_link_whose_mass_is_welded_to_it_is_left_alone(load_robot):
         urdf("", SOLID).replace('"0 0 0.3"', '"0 0 ${height}"'),
     ],
 )
-def test_a_xacro_is_said_to_be_one(load_robot, text):
+def test_a_xacro_is_said_to_be_one(load_urdf, text):
     with pytest.raises(RobotError, match=r"this is a xacro, from which a URDF is made first: xacro arm.urdf.xacro > arm.urdf"):
-        load_robot(text)
+        load_urdf(text)
 
 
-def test_joints_that_follow_others_are_held(load_robot):
+def test_joints_that_follow_others_are_held(load_urdf):
     """A gripper whose second finger mimics the first: refused with the way out, and read when it is held."""
     mimic = urdf("", SOLID, SOLID, SOLID).replace('"j3" type="revolute">', '"j3" type="revolute"><mimic joint="j2"/>')
     with pytest.raises(RobotError, match=r"couples joints; hold the joints that follow others \(--lock JOINT=VALUE"):
-        kinematic_tree(load_robot(mimic))
-    robot = load_robot(mimic, Mounting(joints=("j1",)).edit)
+        kinematic_tree(load_urdf(mimic))
+    robot = load_urdf(mimic, Mounting(joints=("j1",)).edit)
     assert robot.joints == ("j1",)
     assert kinematic_tree(robot).n == 1
 
@@ -107,13 +112,11 @@ def test_a_held_body_stands_where_it_stood_however_its_file_says_it(load_robot, 
       <body pos="0.1 0.2 0.3" {turned}><joint name="held" axis="1 1 0" pos="0.1 0 0.2" ref="{ref}" range="{range_}"/>
       <geom size="0.1"/><body name="tip" pos="0.3 0.2 0.1"><joint name="last" axis="0 0 1"/><geom size="0.1"/>
       </body></body></body></worldbody></mujoco>"""
-    whole, held = load_robot(text, name="arm.xml"), load_robot(text, Mounting(lock=(("held", 0.5),)).edit, name="arm.xml")
+    whole, held = load_robot(text), load_robot(text, Mounting(lock=(("held", 0.5),)).edit)
     places = []
     for robot, q in ((whole, [0.2, 0.5, -0.3]), (held, [0.2, -0.3])):
-        data = mujoco.MjData(robot.model)
-        data.qpos[:] = q
-        mujoco.mj_forward(robot.model, data)
-        places.append(np.concatenate([data.body("tip").xpos, data.body("tip").xmat]))
+        tip = forward(robot, q).body("tip")
+        places.append(np.concatenate([tip.xpos, tip.xmat]))
     np.testing.assert_allclose(places[1], places[0], atol=1e-12)
 
 
@@ -121,7 +124,7 @@ def test_one_of_several_joints_of_a_body_is_not_held(load_robot):
     text = """<mujoco><worldbody><body name="b"><joint name="x" axis="1 0 0"/><joint name="y" axis="0 1 0"/><geom size="0.1"/>
       </body></worldbody></mujoco>"""
     with pytest.raises(RobotError, match="y is one of several joints of body 'b'"):
-        load_robot(text, Mounting(lock=(("y", 0.5),)).edit, name="arm.xml")
+        load_robot(text, Mounting(lock=(("y", 0.5),)).edit)
 
 
 def test_limits_go_with_the_joints_that_are_held():
@@ -137,11 +140,9 @@ def test_a_slide_and_a_ball_are_held(load_robot):
       <geom size="0.1"/></body></body></body></worldbody>
       <actuator><motor joint="rail"/><motor name="m" joint="t"/></actuator><sensor><jointpos joint="rail"/></sensor>
       <keyframe><key qpos="0.1 1 0 0 0 0"/></keyframe></mujoco>"""
-    robot = load_robot(text, Mounting(("t",), (("rail", 0.4),)).edit, name="arm.xml")
+    robot = load_robot(text, Mounting(("t",), (("rail", 0.4),)).edit)
     assert (robot.joints, robot.model.nu, robot.model.nsensor, robot.model.nkey) == (("t",), 1, 0, 0)
-    data = mujoco.MjData(robot.model)
-    mujoco.mj_forward(robot.model, data)
-    np.testing.assert_allclose(data.body("tip").xpos, [0, 0.3, 1], atol=1e-12)
+    np.testing.assert_allclose(forward(robot, robot.model.qpos0).body("tip").xpos, [0, 0.3, 1], atol=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -154,9 +155,9 @@ def test_a_slide_and_a_ball_are_held(load_robot):
         (Mounting(gravity=(0.0, 0.0, np.nan)), "three finite numbers"),
     ],
 )
-def test_a_mounting_that_makes_no_sense_is_told(load_robot, mounting, message):
+def test_a_mounting_that_makes_no_sense_is_told(load_urdf, mounting, message):
     with pytest.raises(RobotError, match=message):
-        load_robot(urdf("", SOLID, SOLID), mounting.edit)
+        load_urdf(urdf("", SOLID, SOLID), mounting.edit)
 
 
 def test_a_lock_that_is_none_is_told():
@@ -165,8 +166,8 @@ def test_a_lock_that_is_none_is_told():
         locked(["a"])
 
 
-def test_a_robot_on_a_wall_has_its_gravity_aside(load_robot):
-    wall = load_robot(urdf("", SOLID, SOLID), Mounting(gravity=(9.81, 0.0, 0.0)).edit)
+def test_a_robot_on_a_wall_has_its_gravity_aside(load_urdf):
+    wall = load_urdf(urdf("", SOLID, SOLID), Mounting(gravity=(9.81, 0.0, 0.0)).edit)
     np.testing.assert_array_equal(kinematic_tree(wall).gravity, [9.81, 0, 0])
 
 
@@ -174,7 +175,7 @@ def test_meshes_that_are_not_there_cost_a_robot_its_looks_alone(load_robot):
     text = """<mujoco><asset><mesh name="m" file="gone.stl"/></asset><worldbody><body name="a"><joint axis="0 0 1"/>
       <inertial pos="0 0 0" mass="2" diaginertia="1 1 1"/><geom type="mesh" mesh="m"/>
       <body name="b"><joint axis="0 1 0"/><geom type="mesh" mesh="m"/></body></body></worldbody></mujoco>"""
-    robot = load_robot(text, name="arm.xml")
+    robot = load_robot(text)
     assert robot.model.body("a").mass[0] == 2
     assert "meshes that are not there (m)" in robot.notes[0]
     assert "no inertia of b but that of its mesh" in robot.notes[1]
@@ -217,9 +218,9 @@ def test_an_arm_with_classes_a_gripper_by_tendon_and_keyframes_reads(load_robot,
       <sensor><tendonpos tendon="split"/><jointpos joint="joint1"/><actuatorpos actuator="grip"/></sensor>
       <keyframe><key name="home" qpos="0 0.5 0.04 0.04" ctrl="0 0.5 255"/></keyframe></mujoco>"""
     with pytest.raises(RobotError, match="closes a chain or couples joints"):
-        kinematic_tree(load_robot(text, name="arm.xml"))
+        kinematic_tree(load_robot(text))
     mounting = Mounting(joints=("joint1", "joint2"))
-    robot = load_robot(text, mounting.edit, name="arm.xml")
+    robot = load_robot(text, mounting.edit)
     model = robot.model
     assert robot.joints == ("joint1", "joint2")
     assert (model.nu, model.ntendon, model.neq, model.nkey, model.nsensor, model.nexclude) == (2, 0, 0, 0, 1, 1)
@@ -251,29 +252,29 @@ def test_ties_of_bodies_that_move_as_one_are_left_out_and_said(load_robot, tie, 
     held = Mounting(joints=("arm",))
     if not open_:
         with pytest.raises(RobotError, match="closes a chain"):
-            kinematic_tree(load_robot(GRIPPER.format(tie), held.edit, name="arm.xml"))
+            kinematic_tree(load_robot(GRIPPER.format(tie), held.edit))
         return
-    robot = load_robot(GRIPPER.format(tie), held.edit, name="arm.xml")
+    robot = load_robot(GRIPPER.format(tie), held.edit)
     assert [joint.name for joint in kinematic_tree(robot).joints] == ["arm"]
     assert len(robot.notes) == 1
     assert "ties that hold nothing that moves" in robot.notes[0]
     with pytest.raises(RobotError, match="closes a chain"):
-        kinematic_tree(load_robot(GRIPPER.format('<connect body1="left" body2="right" anchor="0 0 .1"/>'), name="arm.xml"))
+        kinematic_tree(load_robot(GRIPPER.format('<connect body1="left" body2="right" anchor="0 0 .1"/>')))
 
 
-def test_prefixes_that_nothing_declares_are_read_and_written(load_robot, tmp_path):
+def test_prefixes_that_nothing_declares_are_read_and_written(load_urdf, tmp_path):
     drake = '<drake:reducing_gear value="1"/></joint>'
     text = urdf("", SOLID).replace("</joint>", drake)
-    robot = load_robot(text)
+    robot = load_urdf(text)
     assert robot.joints == ("j1",)
     assert "drake:reducing_gear" in urdf_text(str(tmp_path / "arm.urdf"), robot, kinematic_tree(robot), {}, Mounting())
 
 
-def test_a_line_that_is_named_is_that_of_the_file(load_robot):
+def test_a_line_that_is_named_is_that_of_the_file(load_urdf):
     shape = "<visual>\n<geometry>\n<box size='1 1 1'/>\n</geometry>\n</visual>"
     text = "<!-- one\ntwo -->\n" + urdf(shape, SOLID).replace('upper="2"', '\n\nupper="two"')
     with pytest.raises(RobotError, match=r"upper.* line 7"):
-        load_robot(text)
+        load_urdf(text)
 
 
 def test_a_part_of_a_file_names_the_file_to_give(load_robot, tmp_path):

@@ -1,7 +1,7 @@
 """Shapes and poses against MuJoCo's own, one state at a time."""
 
-import mujoco
 import numpy as np
+from builders import forward
 from scipy.spatial.transform import Rotation
 
 from idbench.sim.robot.scene import Mover, shapes
@@ -9,11 +9,11 @@ from idbench.sim.robot.scene import Mover, shapes
 
 def test_shapes_moved_by_their_bodies_are_where_mujoco_puts_the_geoms(robot, rng):
     q = rng.uniform(-2, 2, (5, 2))
-    moving, data = Mover(robot).at(q), mujoco.MjData(robot.model)
+    moving = Mover(robot).at(q)
+    assert len(shapes(robot)) == robot.model.ngeom
     assert {shape.kind for shape in shapes(robot)} == {"box", "cylinder"}
     for k in range(5):
-        data.qpos[:] = q[k]
-        mujoco.mj_forward(robot.model, data)
+        data = forward(robot, q[k])
         for shape in shapes(robot):
             body = Rotation.from_quat(moving.quaternions[shape.body][k])
             geom = data.geom(shape.name)
@@ -21,7 +21,3 @@ def test_shapes_moved_by_their_bodies_are_where_mujoco_puts_the_geoms(robot, rng
             turned = (body * Rotation.from_quat(shape.quaternion)).as_matrix()
             np.testing.assert_allclose(turned, geom.xmat.reshape(3, 3), atol=1e-12)
         np.testing.assert_allclose(moving.sites["tool"][k], data.site("tool").xpos, atol=1e-12)
-
-
-def test_every_visible_geom_is_drawn(robot):
-    assert len(shapes(robot)) == robot.model.ngeom

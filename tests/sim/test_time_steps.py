@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 
 from idbench.sim.robot.inverse_dynamics import coulomb_torque, inverse_dynamics
-from idbench.sim.robot.robot import Robot
 from idbench.sim.robot.time_steps import actuator_damping, apparent_rotor_inertia, torque_of_steps
 
 H = 0.002
@@ -17,9 +16,8 @@ ARM = """<mujoco><option timestep="0.002" integrator="{}"><flag {}/></option>
 </worldbody><actuator><position joint="a" kp="100" kv="6"/><position joint="b" kp="20" kv="1" gear="2"/></actuator></mujoco>"""
 
 
-def simulated(path):
+def simulated(model):
     """Return positions and torques of a plain simulation, logged before each step."""
-    model = mujoco.MjModel.from_xml_path(path)
     data, q, tau = mujoco.MjData(model), [], []
     for k in range(3000):
         data.ctrl = np.sin(np.array([2.1, 3.3]) * k * H) * (1 - np.exp(-3 * k * H))
@@ -44,15 +42,14 @@ def slope(x):
         ("implicit", "", 3e-3),  # its Coriolis torques are linearized about the beginning of the step
     ],
 )
-def test_torques_of_every_integrator_become_those_of_the_motion(tmp_path, integrator, flag, left):
+def test_torques_of_every_integrator_become_those_of_the_motion(load_robot, integrator, flag, left):
     """Inverse dynamics of the positions, by MuJoCo, is another route than its step; errors are over what is corrected."""
-    path = tmp_path / "arm.xml"
-    path.write_text(ARM.format(integrator, flag))
-    q, tau = simulated(str(path))
+    robot = load_robot(ARM.format(integrator, flag))
+    q, tau = simulated(robot.model)
     motion = [q]
     for _ in range(4):
         motion.append(slope(motion[-1]))
-    robot, inner = Robot.load(str(path)), slice(500, -20)
+    inner = slice(500, -20)
     expected = inverse_dynamics(robot, *motion[:3]) + coulomb_torque(robot, motion[1])
     extra = torque_of_steps(robot, motion)
     off = np.sqrt(np.mean(((tau - extra) - expected)[inner] ** 2, axis=0) / np.mean(tau[inner] ** 2, axis=0))
@@ -61,22 +58,17 @@ def test_torques_of_every_integrator_become_those_of_the_motion(tmp_path, integr
     assert (before > 10 * off).all()
 
 
-def test_what_seems_inertia_is_that_of_the_damping_at_the_end_of_a_step(tmp_path):
-    path = tmp_path / "arm.xml"
-    sizes = {}
-    for integrator, flag in (
-        ("implicitfast", ""),
-        ("implicit", ""),
-        ("Euler", ""),
-        ("Euler", 'eulerdamp="disable"'),
-        ("RK4", ""),
-    ):
-        path.write_text(ARM.format(integrator, flag))
-        sizes[integrator + flag] = apparent_rotor_inertia(Robot.load(str(path)))
-    kv, half = np.array([6.0, 4.0]), 0.35
-    np.testing.assert_allclose(actuator_damping(Robot.load(str(path))), kv)
-    np.testing.assert_allclose(sizes["implicitfast"], H * (kv + half))
-    np.testing.assert_allclose(sizes["implicit"], H * (kv + half))
-    np.testing.assert_allclose(sizes["Euler"], [H * half] * 2)
-    np.testing.assert_allclose(sizes['Eulereulerdamp="disable"'], [-H * half] * 2)
-    assert not sizes["RK4"].any()
+@pytest.mark.parametrize(
+    ("integrator", "flag", "kv", "half"),
+    [
+        ("implicitfast", "", 1, 1),
+        ("implicit", "", 1, 1),
+        ("Euler", "", 0, 1),
+        ("Euler", 'eulerdamp="disable"', 0, -1),
+        ("RK4", "", 0, 0),
+    ],
+)
+def test_what_seems_inertia_is_that_of_the_damping_at_the_end_of_a_step(load_robot, integrator, flag, kv, half):
+    robot, damping = load_robot(ARM.format(integrator, flag)), np.array([6.0, 4.0])
+    np.testing.assert_allclose(actuator_damping(robot), damping)
+    np.testing.assert_allclose(apparent_rotor_inertia(robot), H * (kv * damping + half * 0.35), atol=1e-12)

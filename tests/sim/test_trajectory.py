@@ -1,8 +1,7 @@
-"""Quintic moves against SciPy's Hermite polynomials, and the fastest against ruckig."""
+"""Quintic moves against SciPy's Hermite polynomials, and the limits that the fastest reach."""
 
 import numpy as np
 import pytest
-import ruckig
 from scipy.interpolate import BPoly
 
 from idbench.sim.errors import ScenarioError
@@ -64,19 +63,6 @@ def test_the_fastest_moves_reach_a_limit_and_pass_none(limit):
     first = t <= moves.durations[0]
     assert used[first].max() == pytest.approx(1, abs=1e-6)
     assert used[~first].max() == pytest.approx(1, abs=1e-6)
-
-
-def test_the_fastest_quintic_is_slower_than_the_time_optimal_move(rng):
-    """An independent lower bound: ruckig's time-optimal move under the same limits, with jerk unlimited."""
-    for start, end in rng.uniform(-2, 2, (20, 2, 2)):
-        velocity, acceleration = rng.uniform(1, 4, 2), rng.uniform(5, 20, 2)
-        problem = ruckig.InputParameter(2)
-        problem.current_position, problem.target_position = list(start), list(end)
-        problem.max_velocity, problem.max_acceleration, problem.max_jerk = list(velocity), list(acceleration), [np.inf] * 2
-        optimal = ruckig.Trajectory(2)
-        assert ruckig.Ruckig(2).calculate(problem, optimal) == ruckig.Result.Working
-        quintic = fastest([start, end], velocity, acceleration)
-        assert optimal.duration < quintic.duration < 2 * optimal.duration
 
 
 @pytest.mark.parametrize(

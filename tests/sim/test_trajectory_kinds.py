@@ -8,7 +8,7 @@ import pytest
 
 from idbench.sim.errors import ScenarioError
 from idbench.sim.robot.robot import Robot
-from idbench.sim.trajectories import TRAJECTORIES, Quintic, RandomMoves, TimeOptimal
+from idbench.sim.trajectories import TRAJECTORIES, Fourier, Quintic, RandomMoves, TimeOptimal
 
 POINTS = ((0.0, 0.0), (1.5, -1.0), (1.4, 1.0), (-1.0, 0.9))
 FAST = TimeOptimal(POINTS, velocity=(4.0, 5.0), acceleration=(15.0, 20.0), jerk=(200.0, 300.0), rest=0.5)
@@ -30,20 +30,48 @@ def test_ruckigs_moves_keep_their_limits_and_reach_one(robot):
     assert np.quantile(used[moving], 0.02) > 0.99
 
 
-def test_its_derivatives_are_its_own(robot):
-    motion = FAST.plan(robot)
-    t, h = np.linspace(0.01, motion.duration - 0.01, 997), 1e-6
-    before, here, after = (motion.at(t + d, 1.0) for d in (-h, 0.0, h))
-    np.testing.assert_allclose((after.q - before.q) / (2 * h), here.qd, atol=1e-7)
-    np.testing.assert_allclose((after.qd - before.qd) / (2 * h), here.qdd, atol=2e-4)  # 300 rad/s^3 of jerk, and its steps
-
-
-def test_it_rests_at_its_waypoints_and_ends(robot):
+def test_it_rests_at_its_waypoints(robot):
     motion = FAST.plan(robot)
     ends = motion.at(np.array([0.0, 0.4, motion.duration - 0.4, motion.duration + 1.0]), 1.0)
-    np.testing.assert_allclose(ends.q[[0, 1]], [POINTS[0]] * 2, atol=1e-12)
-    np.testing.assert_allclose(ends.q[[2, 3]], [POINTS[-1]] * 2, atol=1e-9)
+    np.testing.assert_allclose(ends.q, [POINTS[0]] * 2 + [POINTS[-1]] * 2, atol=1e-9)
+
+
+SERIES = Fourier(period=4.0, middle=(0.1, 0.2), sines=((0.3, 0.2), (0.1, -0.1)), cosines=((0.0, 0.1), (0.2, 0.0)), fade=1.0)
+
+
+@pytest.mark.parametrize(
+    "trajectory",
+    [FAST, SERIES, Fourier(), replace(Fourier(), repeat=3)],
+    ids=["time-optimal", "fading", "at rest", "three times"],
+)
+def test_a_motion_is_that_of_its_derivatives_and_rests_at_its_ends(robot, trajectory):
+    """To what 300 rad/s^3 of jerk, and its steps, leave of a difference."""
+    motion, rest = trajectory.plan(robot), trajectory.rest
+    t, h = np.linspace(rest + 0.01, motion.duration - rest - 0.01, 997), 1e-6
+    before, here, after = (motion.at(t + d, 1.0) for d in (-h, 0.0, h))
+    np.testing.assert_allclose((after.q - before.q) / (2 * h), here.qd, atol=1e-7)
+    np.testing.assert_allclose(
+        (after.qd - before.qd) / (2 * h), here.qdd, atol=2e-4 if trajectory is FAST else 1e-6
+    )  # its jerk
+    ends = motion.at(np.array([0.0, rest, motion.duration - rest, motion.duration + 1]), 1.0)
     np.testing.assert_allclose(ends.qd, 0.0, atol=1e-9)
+
+
+def test_a_series_is_its_sum_in_the_middle(robot):
+    motion = replace(SERIES, repeat=2).plan(robot)
+    t = np.array([0.0, 0.7, 4.3])
+    w = 2 * np.pi / 4.0
+    one = 0.1 + 0.3 * np.sin(w * t) + 0.1 * np.sin(2 * w * t) + 0.2 * np.cos(2 * w * t)
+    np.testing.assert_allclose(motion.at(SERIES.rest + SERIES.fade + t, 1.0).q[:, 0], one)
+
+
+def test_a_series_that_does_not_rest_must_fade_in():
+    with pytest.raises(ScenarioError, match="does not begin at rest: give it a time to fade in"):
+        replace(SERIES, fade=0.0)
+    with pytest.raises(ScenarioError, match="needs 2 coefficients"):
+        replace(SERIES, sines=((0.1,), (0.2,)))
+    with pytest.raises(ScenarioError, match="give as many of both"):
+        replace(SERIES, sines=((0.1, 0.2),))
 
 
 def test_it_is_faster_than_fifth_order_moves_under_the_same_limits(robot):

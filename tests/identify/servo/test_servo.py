@@ -130,30 +130,39 @@ def test_time_that_stands_is_refused(runs: list[ServoRun]) -> None:
         ServoRun(t, run.q, run.command, run.load, run.servo)
 
 
+STEPS = np.repeat([0.0, 0.5, -0.3], 200)
+RESTING = [0, 2, 2.5, 4, 4.5, 6]
+"""Commands of 6 s, and when a joint that follows them starts and stops [s]."""
+
+
+def pieces_of(q, command, settled=0.03):
+    run = ServoRun(np.arange(len(q)) * 0.01, q, command, JointLoad.pendulum(0.5, 0.1), SERVO)
+    return pieces(run, settled)
+
+
+def following(turns):
+    return np.interp(np.arange(600) * 0.01, turns, [0.0, 0.0, 0.5, 0.5, -0.3, -0.3])
+
+
 def test_pieces_begin_at_rest_and_leave_nothing_out_that_moves():
-    t = np.arange(0, 6, 0.01)
-    command = np.repeat([0.0, 0.5, -0.3], 200)
-    q = np.interp(t, [0, 2, 2.5, 4, 4.5, 6], [0.0, 0.0, 0.5, 0.5, -0.3, -0.3])
-    run = ServoRun(t, q, command, JointLoad.pendulum(0.5, 0.1), SERVO)
-    parts = pieces(run, 0.03)
-    assert all(part.q[0] == part.q[1] and part.command[0] == part.command[1] for part in parts)
-    assert sum(np.abs(np.diff(part.q)).sum() for part in parts) == pytest.approx(1.3)
-    assert max(part.t[-1] - part.t[0] for part in parts) < 2.5
+    """But a motion that was under way when the log began: how it began is not known."""
+    still = following(RESTING)
+    moving = still + 0.1 * np.clip(1 - np.arange(600) * 0.01 / 0.3, 0, None)
+    for q in (moving, still):
+        parts = pieces_of(q, STEPS)
+        assert all(part.q[0] == part.q[1] and part.command[0] == part.command[1] for part in parts)
+        assert sum(np.abs(np.diff(part.q)).sum() for part in parts) == pytest.approx(1.3)
+        assert max(part.t[-1] - part.t[0] for part in parts) < 2.5
 
 
 def test_a_run_that_never_rests_is_one_piece():
-    t = np.arange(0, 6, 0.01)
-    run = ServoRun(t, np.sin(t), np.sin(t), JointLoad.pendulum(0.5, 0.1), SERVO)
-    assert len(pieces(run, 0.03)) == 1
+    wave = np.sin(np.arange(600) * 0.01)
+    assert len(pieces_of(wave, wave)) == 1
 
 
 def test_pieces_begin_when_a_late_command_has_arrived():
     """A joint that rests because its command is late has a target that is still on its way."""
-    t = np.arange(0, 6, 0.01)
-    command = np.repeat([0.0, 0.5, -0.3], 200)
-    q = np.interp(t, [0, 2.3, 2.8, 4.3, 4.8, 6], [0.0, 0.0, 0.5, 0.5, -0.3, -0.3])
-    run = ServoRun(t, q, command, JointLoad.pendulum(0.5, 0.1), SERVO)
-    starts = [part.t[0] for part in pieces(run, 0.3)][1:]
+    starts = [part.t[0] for part in pieces_of(following([0, 2.3, 2.8, 4.3, 4.8, 6]), STEPS, 0.3)][1:]
     assert len(starts) > 0
     changed = np.array([2.0, 4.0])
     assert all(not ((changed < s) & (changed > s - 0.4)).any() for s in starts)
@@ -161,18 +170,5 @@ def test_pieces_begin_when_a_late_command_has_arrived():
 
 def test_the_only_motion_of_a_log_is_kept():
     """A step at once, and then rest: without the step there would be nothing."""
-    t = np.arange(0, 2, 0.01)
-    run = ServoRun(t, np.interp(t, [0, 0.3], [0.0, 0.5]), np.full(200, 0.5), JointLoad.pendulum(0.5, 0.1), SERVO)
-    assert np.ptp(pieces(run, 0.03)[0].q) == pytest.approx(0.5)
-
-
-def test_a_motion_that_was_under_way_when_the_log_began_is_left_out():
-    """How it began is not known; nothing of a log is left out whose joint rests at first."""
-    t = np.arange(0, 6, 0.01)
-    command = np.repeat([0.0, 0.5, -0.3], 200)
-    still = np.interp(t, [0, 2, 2.5, 4, 4.5, 6], [0.0, 0.0, 0.5, 0.5, -0.3, -0.3])
-    moving = still + 0.1 * np.clip(1 - t / 0.3, 0, None)
-    load = JointLoad.pendulum(0.5, 0.1)
-    for q in (moving, still):
-        parts = pieces(ServoRun(t, q, command, load, SERVO), 0.03)
-        assert sum(np.abs(np.diff(part.q)).sum() for part in parts) == pytest.approx(1.3)
+    (first, *_) = pieces_of(np.interp(np.arange(200) * 0.01, [0, 0.3], [0.0, 0.5]), np.full(200, 0.5))
+    assert np.ptp(first.q) == pytest.approx(0.5)

@@ -1,4 +1,4 @@
-"""What columns of files mean: units, numbered names, temperatures, motors."""
+"""What columns of files mean: units, numbered names, temperatures, motors, and which leave a doubt."""
 
 from dataclasses import replace
 
@@ -7,6 +7,7 @@ import pytest
 
 from idbench.identify import LogError, MotionLog, TorqueChannel
 from idbench.identify.data.resample import Repaired
+from idbench.identify.files.guess import guess
 from idbench.identify.files.layout import LogLayout, Source, matching
 from idbench.identify.files.log_file import read_log, write_log
 from idbench.identify.files.reading import read_columns
@@ -65,3 +66,52 @@ def test_motors_are_turned_to_joints(tmp_path):
     (tmp_path / "log.toml").write_text("[motors]\nmatrix = [[1]]\n")
     with pytest.raises(LogError, match=r"has 1 rows, the log 2 motors"):
         read_columns(tmp_path / "run.csv")
+
+
+T = np.arange(0, 1, 0.01)
+Q = 0.5 * np.sin(np.outer(T, [1.0, 2.0, 3.0]))
+QD = 0.5 * np.array([1.0, 2.0, 3.0]) * np.cos(np.outer(T, [1.0, 2.0, 3.0]))
+TAU = 2 * Q + QD
+
+
+def trajectory_bag(path):
+    """Write all points of a motion into one message of a trajectory."""
+    rosbag2 = pytest.importorskip("rosbags.rosbag2")
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    names = ("trajectory_msgs/msg/JointTrajectory", "trajectory_msgs/msg/JointTrajectoryPoint", "std_msgs/msg/Header")
+    trajectory, point, header = (store.types[name] for name in names)
+    stamp, duration = (store.types[f"builtin_interfaces/msg/{name}"] for name in ("Time", "Duration"))
+    after = [duration(sec=int(t), nanosec=round((t - int(t)) * 1e9)) for t in T]
+    none = np.zeros(0)
+    points = [point(q, qd, none, tau, t) for t, q, qd, tau in zip(after, Q, QD, TAU, strict=True)]
+    with rosbag2.Writer(path, version=9) as writer:
+        topic = writer.add_connection("/executed", trajectory.__msgtype__, typestore=store)
+        message = trajectory(header(stamp(sec=0, nanosec=0), "base"), ["base", "elbow", "wrist"], points)
+        writer.write(topic, 1, store.serialize_cdr(message, trajectory.__msgtype__))
+
+
+def test_points_of_a_trajectory_are_a_log(tmp_path):
+    trajectory_bag(tmp_path / "bag")
+    columns = read_columns(tmp_path / "bag")
+    assert columns.joints == ("base", "elbow", "wrist")
+    for values, expected in ((columns.t, T), (columns.q, Q), (columns.qd, QD), (columns.tau, TAU)):
+        np.testing.assert_allclose(values, expected, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("letters", "groups", "doubt"),
+    [
+        (("joint_position_{}", "motor_position_{}", "effort_{}"), (Q, 100 * Q, TAU), "could be meant"),
+        (("position_{}", "effort_{}"), (Q, TAU), "the same joints?"),
+    ],
+    ids=["two groups of positions", "joints with other numbers"],
+)
+def test_columns_that_leave_a_doubt_need_a_header(letters, groups, doubt, tmp_path):
+    numbers = [(2, 3, 4) if doubt == "the same joints?" and "effort" in letter else (1, 2, 3) for letter in letters]
+    names = ["t", *(letter.format(j) for letter, joints in zip(letters, numbers, strict=True) for j in joints)]
+    np.savetxt(tmp_path / "log.csv", np.c_[T, *groups], delimiter=",", header=",".join(names), comments="")
+    assert any(doubt in found for found in guess(tmp_path / "log.csv").doubts)
+    with pytest.raises(LogError, match="must have a header"):
+        read_columns(tmp_path / "log.csv")

@@ -1,12 +1,19 @@
-"""Looking into an identification, against closed forms."""
+"""Residuals, instant by instant and by frequency, against closed forms."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from builders import noisy
 
 from idbench.identify import (
     CHAINS,
     MODELS,
     MotionLog,
+    NoiseLevels,
+    NoPrefilter,
+    Problem,
+    ReversalMask,
     TorqueChannel,
     binned,
     cutoffs,
@@ -14,6 +21,7 @@ from idbench.identify import (
     idbench_chain,
     instants,
     measured_state,
+    noise_spectra,
     scara,
     spectrum,
 )
@@ -77,3 +85,19 @@ def test_slow_motion_passes_the_filters_unchanged(chain):
     np.testing.assert_allclose(seen["q"][0], np.sin(0.5 * rows), atol=2e-3)
     np.testing.assert_allclose(seen["qd"][0], 0.5 * np.cos(0.5 * rows), atol=2e-3)
     np.testing.assert_allclose(seen["qdd"][1], -0.09 * np.cos(0.3 * rows), atol=2e-3)
+
+
+@pytest.mark.parametrize(("position", "torque"), [(2.8e-5, 0.0), (0.0, 0.05), (2.8e-5, 0.05)])
+def test_the_spectra_are_those_of_noise_put_into_a_log(position, torque, log, truth, rng):
+    """Between 5 and 40 Hz, in the mean to 10 %: the residual of true parameters, over the instants that are not masked."""
+    chain = replace(idbench_chain(), prefilter=NoPrefilter(), mask=ReversalMask(width=0.03, taper=0.1))
+    problem = Problem((noisy(log, position, torque, rng=rng),), scara(), MODELS.create("explicit"), chain)
+    left = instants(problem.signals[0], scara(), problem.model, chain, truth)
+    for joint in (0, 1):
+        weight = left.weight[joint]
+        f, seen = spectrum(left.residual[joint] * weight, log.fs, 0.5)
+        seen = seen / np.sqrt(np.mean(weight**2))
+        levels = NoiseLevels(np.full(2, torque), np.full(2, position))
+        predicted = np.hypot(*(density[joint] for density in noise_spectra(problem, levels, f)))
+        inside = (f > 5) & (f < 40)
+        assert np.exp(np.mean(np.log(seen[inside] / predicted[inside]))) == pytest.approx(1, abs=0.1)

@@ -1,9 +1,10 @@
-"""The step of an encoder, found in its counts."""
+"""Steps of encoders, found in their counts, and velocities of tachometers beside positions."""
 
 import numpy as np
 import pytest
 
 from idbench.identify import encoder_steps
+from idbench.identify.data.jumps import Velocities
 
 T = np.arange(2000) / 100.0
 MOTION = np.stack([np.sin(T) + 0.1 * T, 0.3 * np.cos(2 * T)], axis=-1)
@@ -34,3 +35,33 @@ def test_positions_without_steps_have_none(rng):
 def test_one_small_difference_is_no_encoder():
     moved = np.append(np.random.default_rng(0).uniform(0.8e-3, 1.2e-3, 400), 1e-7)
     assert np.isnan(encoder_steps(np.cumsum(moved)[:, None])).all()
+
+
+FAST = np.arange(0, 8, 1e-3)
+TRUE = np.stack([np.sin(1.3 * FAST) + 0.5 * np.sin(3 * FAST), np.cos(2 * FAST)], axis=1)
+SPEED = np.stack([1.3 * np.cos(1.3 * FAST) + 1.5 * np.cos(3 * FAST), -2 * np.sin(2 * FAST)], axis=1)
+
+
+def test_velocities_that_know_better_are_used(rng):
+    """A 12-bit encoder beside a tachometer: errors fall below a fifth; both noises alone are an order larger."""
+    step = 2 * np.pi / 4096
+    q, qd = np.round(TRUE / step) * step, SPEED + 1e-3 * rng.normal(size=TRUE.shape)
+    found = Velocities.of(q, qd, 1000.0)
+    assert found.used.all()
+    inner = slice(500, -500)
+    better = np.std((found.improved(q, qd) - TRUE)[inner], axis=0)
+    assert (better < 0.2 * np.std((q - TRUE)[inner], axis=0)).all()
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        (lambda qd: 57.3 * qd, "57.3 times the differences"),
+        (lambda qd: np.roll(qd, 6, axis=0), "6 ms late: not used"),
+    ],
+    ids=["degrees", "late"],
+)
+def test_velocities_that_are_not_those_of_the_positions(wrong, message, rng):
+    found = Velocities.of(TRUE + 1e-6 * rng.normal(size=TRUE.shape), wrong(SPEED), 1000.0)
+    assert not found.used.any()
+    assert message in " ".join(found.words(("a", "b")))

@@ -1,5 +1,6 @@
 """Errors of counts that a periodic motion repeats, and sigma on moves and Fourier series where counts are the only noise."""
 
+import exact_scara
 import numpy as np
 import pytest
 
@@ -55,48 +56,15 @@ def test_a_long_log_goes_on_as_it_begins(rng):
     np.testing.assert_allclose(repeats([logged(q)], np.array([sigma])), 2**4, rtol=0.25)
 
 
-def fourier(rng, base):
-    """Return q, qd and qdd of random Fourier series of five harmonics, shape (time, joint) each."""
-    w = (2 * np.pi * base * np.arange(1, 6))[:, None]
-    s, c = np.sin(w * T), np.cos(w * T)
-    a, b = rng.standard_normal((2, 2, 5, 1))
-    q, qd, qdd = (np.sum(x, axis=1).T for x in ((a * s - b * c) / w, a * c + b * s, w * (b * c - a * s)))
-    size = np.minimum(1.5 / np.abs(q).max(axis=0), 3 / np.abs(qd).max(axis=0))
-    return size * q, size * qd, size * qdd
-
-
-def moves(rng):
-    """Return q, qd and qdd of random fifth-order moves with rests, shape (time, joint) each."""
-    found = np.zeros((3, len(T), 2))
-    for j in range(2):
-        start, here = 0.0, 0.0
-        while start < SECONDS:
-            duration, there = rng.uniform(0.6, 1.2), rng.uniform(-1.5, 1.5)
-            moving, way = (start <= T) & (start + duration > T), there - here
-            s = (T[moving] - start) / duration
-            found[0, moving, j] = here + way * (10 * s**3 - 15 * s**4 + 6 * s**5)
-            found[1, moving, j] = way * 30 * (s**2 - 2 * s**3 + s**4) / duration
-            found[2, moving, j] = way * 60 * (s - 3 * s**2 + 2 * s**3) / duration**2
-            found[0, start + duration <= T, j] = there
-            start, here = start + duration + rng.uniform(0.1, 0.3), there
-    return tuple(found)
-
-
-def torque(X, q, qd, qdd):
-    """Return the torques of the SCARA, typed from the paper's Eq. 51."""
-    ZZR1, Fv1, Fs1, ZZ2, LMX2, LMY2, Fv2, Fs2 = X
-    (a1, a2), (v1, v2), c, s = qdd.T, qd.T, np.cos(q[:, 1]), np.sin(q[:, 1])
-    both = (2 * a1 + a2) * c - v2 * (2 * v1 + v2) * s, (2 * a1 + a2) * s + v2 * (2 * v1 + v2) * c
-    first = ZZR1 * a1 + ZZ2 * (a1 + a2) + LMX2 * both[0] - LMY2 * both[1] + Fv1 * v1 + Fs1 * np.sign(v1)
-    second = ZZ2 * (a1 + a2) + LMX2 * (a1 * c + v1**2 * s) - LMY2 * (a1 * s - v1**2 * c) + Fv2 * v2 + Fs2 * np.sign(v2)
-    return np.stack([first, second], axis=-1)
+def fourier(period):
+    return lambda seed: exact_scara.series(200, SECONDS, range(1, 6), period, seed, (np.inf, np.inf))
 
 
 MOTIONS = {
-    "moves": moves,
-    "one period of 40 s": lambda rng: fourier(rng, 1 / 40),
-    "two periods of 20 s": lambda rng: fourier(rng, 1 / 20),
-    "periods of 10.28 s": lambda rng: fourier(rng, 0.09731),
+    "moves": lambda seed: exact_scara.moves(200, SECONDS, (0.6, 1.2), 0.0, seed),
+    "one period of 40 s": fourier(40),
+    "two periods of 20 s": fourier(20),
+    "periods of 10.28 s": fourier(1 / 0.09731),
 }
 
 
@@ -112,10 +80,9 @@ def test_sigma_of_counts_alone_holds_the_truth(motion, bits, truth):
     """
     if (motion, bits) == ("one period of 40 s", 12):
         pytest.skip("velocities are lost in counts")
-    rng = np.random.default_rng(bits)
-    every = [MOTIONS[motion](rng) for _ in range(200)]
-    q = np.array([rounded(one[0], bits, rng)[0] for one in every])
-    log = logged(q, np.array([torque(truth, *one) for one in every]))
+    rng, exact = np.random.default_rng([bits, 1]), MOTIONS[motion](bits)
+    q = np.array([rounded(one, bits, rng)[0] for one in exact[0]])
+    log = logged(q, exact_scara.torque(truth, *exact))
     found = identify(log, scara(), MODELS.create("explicit"))
     z = (found.X - truth) / found.noise_sigma
     blurred = (motion, bits) == ("periods of 10.28 s", 18)
