@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from idbench.identify import CentralDifference, SettingError
+from idbench.identify import CentralDifference
 from idbench.identify.signals.filters import averaged, shift
 
 FS = 50.0
@@ -40,8 +40,3 @@ def test_cell_averages_are_exact_for_cubics(rng):
     integral = p.integ()
     mean = (integral(T + 0.5 / FS) - integral(T - 0.5 / FS)) * FS
     np.testing.assert_allclose(averaged(p(T), 1 / 12)[INNER], mean[INNER], atol=1e-12)
-
-
-def test_unknown_orders_are_refused():
-    with pytest.raises(SettingError, match="order 4 is unknown"):
-        CentralDifference(4)

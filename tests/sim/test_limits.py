@@ -138,25 +138,6 @@ def test_numbers_of_a_file_must_be_as_many_as_its_joints(tmp_path):
         Robot.load(str(path)).most("velocity")
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("velocty = 1", "unknown key 'velocty' (did you mean 'velocity'?)"),
-        ("velocity = -1", "velocity[0] = -1"),
-        ("velocity = ", "cannot read limits"),
-        ('[[keep_out]]\nname = "a"\nlowest = [0, 0, 1]\nhighest = [1, 1, 0]', "is not below highest"),
-    ],
-)
-def test_wrong_limits_are_told(tmp_path, text, message):
-    path = tmp_path / "limits.toml"
-    path.write_text(text)
-    with pytest.raises(ScenarioError) as error:
-        MotionLimits.read(path)
-    assert message in str(error.value)
-    with pytest.raises(ScenarioError, match="cannot read limits"):
-        MotionLimits.read(tmp_path / "nowhere.toml")
-
-
 SERIES = Fourier(period=4.0, middle=(0.1, 0.2), sines=((0.3, 0.2), (0.1, -0.1)), cosines=((0.0, 0.1), (0.2, 0.0)), fade=1.0)
 
 
@@ -177,12 +158,3 @@ def test_a_series_is_its_sum_in_the_middle(robot):
     w = 2 * np.pi / 4.0
     one = 0.1 + 0.3 * np.sin(w * t) + 0.1 * np.sin(2 * w * t) + 0.2 * np.cos(2 * w * t)
     np.testing.assert_allclose(motion.at(SERIES.rest + SERIES.fade + t, 1.0).q[:, 0], one)
-
-
-def test_a_series_that_does_not_rest_must_fade_in():
-    with pytest.raises(ScenarioError, match="does not begin at rest: give it a time to fade in"):
-        replace(SERIES, fade=0.0)
-    with pytest.raises(ScenarioError, match="needs 2 coefficients"):
-        replace(SERIES, sines=((0.1,), (0.2,)))
-    with pytest.raises(ScenarioError, match="give as many of both"):
-        replace(SERIES, sines=((0.1, 0.2),))

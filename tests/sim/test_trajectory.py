@@ -5,7 +5,6 @@ import pytest
 import ruckig
 from scipy.interpolate import BPoly
 
-from idbench.sim.errors import ScenarioError
 from idbench.sim.trajectories import PointToPoint
 from idbench.sim.trajectories.point_to_point import PEAK_VELOCITY
 
@@ -77,18 +76,3 @@ def test_the_fastest_quintic_is_slower_than_the_time_optimal_move(rng):
         assert ruckig.Ruckig(2).calculate(problem, optimal) == ruckig.Result.Working
         quintic = fastest([start, end], velocity, acceleration)
         assert optimal.duration < quintic.duration < 2 * optimal.duration
-
-
-@pytest.mark.parametrize(
-    ("points", "durations", "dwells", "message"),
-    [
-        ([[0.0, 1.0]], [], [0.0], r"shape \(1, 2\), not \(at least 2, joints\)"),
-        ([[0.0], [1.0]], [1.0, 2.0], [0.0, 0.0], "2 waypoints need 1 durations and 2 dwells"),
-        ([[0.0], [1.0]], [0.0], [0.0, 0.0], "durations must be above 0 s"),
-        ([[0.0], [1.0]], [1.0], [0.0, -1.0], "dwells not below"),
-        ([[0.0], [np.nan]], [1.0], [0.0, 0.0], "waypoints hold a value that is not finite"),
-    ],
-)
-def test_impossible_motions_are_refused(points, durations, dwells, message):
-    with pytest.raises(ScenarioError, match=message):
-        PointToPoint(np.array(points), np.array(durations), np.array(dwells))
