@@ -8,6 +8,7 @@ import site
 import subprocess
 import sys
 import sysconfig
+from dataclasses import replace
 from pathlib import Path
 
 NEEDED = (
@@ -46,7 +47,9 @@ import pytest
 
 from idbench.experiments.paper.table1 import CHAINS_COMPARED, SCENARIO, Table1
 from idbench.identify import MotionLog
+from idbench.identify.files.log_file import write_log
 from idbench.sim.engine.run import ideal_log
+from idbench.sim.engine.simulation import simulate
 from idbench.sim.robot.robot import Robot
 from idbench.sim.scenario.scenario_file import load
 
@@ -88,6 +91,17 @@ def table1() -> Table1:
 def log(robot: Robot) -> MotionLog:
     """Ideal data of a motion at which every instant of some rows is masked, and torques are large."""
     return ideal_log(robot, load("brisk").trajectory.sample(robot, 100.0))
+
+
+@pytest.fixture(scope="session")
+def logs(tmp_path_factory):
+    """Return a folder with two logs of the PUMA, short ones."""
+    folder, arm = tmp_path_factory.mktemp("logs"), load("arm")
+    for name, moves, seed in (("first", 12, 0), ("second", 5, 3)):
+        trajectory = replace(arm.trajectory, moves=moves, seed=seed)
+        log = simulate(replace(arm, robot="puma560", fs=250.0, trajectory=trajectory)).alone()
+        write_log(log, folder / f"{name}.parquet")
+    return folder
 
 
 @pytest.fixture(scope="session")

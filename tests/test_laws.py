@@ -8,7 +8,6 @@ import pytest
 
 import idbench
 from idbench.identify import BLOCKS, AbstractFriction, NoMask, ShapedFriction, idbench_chain
-from idbench.sim.errors import ScenarioError
 from idbench.sim.frictions import Law
 from idbench.sim.trajectories import RandomMoves
 
@@ -52,18 +51,3 @@ def test_what_is_simulated_is_identified(name):
         assert run.truth[f"{symbol}{j + 1}"] == pytest.approx(true)
         # A tenth: the low-pass rounds what laws with a jump do at reversals; without one the rest is a thousandth.
         assert found.parameters[f"{symbol}{j + 1}"].value == pytest.approx(true, rel=0.1)
-
-
-@pytest.mark.parametrize(
-    ("settings", "words"),
-    [
-        ({"law": "sticky"}, "no 'sticky' among the blocks"),
-        ({"law": "armature"}, "armature is no law of friction with one parameter a joint"),
-        ({"law": "tanh", "settings": {"vs": 0.1}}, "tanh has no setting 'vs'; it has vt"),
-        ({"law": "tanh", "size": "big"}, "size"),
-    ],
-)
-def test_wrong_laws_are_refused_by_name(settings, words):
-    with pytest.raises((ScenarioError, idbench.IdentificationError)) as refused:
-        Law(**settings)
-    assert words in str(refused.value)

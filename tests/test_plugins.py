@@ -8,7 +8,7 @@ import textwrap
 import numpy as np
 import pytest
 
-from idbench.identify import ESTIMATORS, AbstractEstimator, PluginError, UnknownNameError
+from idbench.identify import ESTIMATORS, AbstractEstimator, PluginError
 from idbench.identify.plugins import PluginTable
 
 
@@ -105,11 +105,6 @@ def test_a_table_is_a_mapping():
     assert "OLS" in ESTIMATORS
     assert "nothing" not in ESTIMATORS
     assert ESTIMATORS.get("nothing") is None
-
-
-def test_an_unknown_name_lists_the_known():
-    with pytest.raises(UnknownNameError, match=r"no 'OSL' among the estimators \(did you mean 'OLS'\?\); known: OLS"):
-        ESTIMATORS.create("OSL")
 
 
 def test_a_plugin_that_cannot_be_loaded_is_named(tmp_path, monkeypatch):

@@ -8,7 +8,6 @@ import pytest
 from idbench.experiments.cli import main
 from idbench.identify import MotionLog
 from idbench.identify.files.log_file import read_log, write_log
-from idbench.sim.engine.simulation import simulate
 from idbench.sim.robot.inverse_dynamics import inverse_dynamics
 from idbench.sim.robot.robot import Robot
 from idbench.sim.scenario.scenario_file import load, to_toml
@@ -32,17 +31,6 @@ def complaint(capfd):
         return lines[0]
 
     return run
-
-
-@pytest.fixture(scope="session")
-def logs(tmp_path_factory):
-    """Return a folder with two logs of the PUMA, short ones."""
-    folder, arm = tmp_path_factory.mktemp("logs"), load("arm")
-    for name, moves, seed in (("first", 12, 0), ("second", 5, 3)):
-        trajectory = replace(arm.trajectory, moves=moves, seed=seed)
-        log = simulate(replace(arm, robot="puma560", fs=250.0, trajectory=trajectory)).alone()
-        write_log(log, folder / f"{name}.parquet")
-    return folder
 
 
 @pytest.fixture

@@ -226,30 +226,6 @@ def test_laws_that_are_objects_are_summed():
     assert {"Fq1", "off1"} <= set(fit.parameters)
 
 
-@pytest.mark.parametrize(
-    ("call", "words"),
-    [
-        (lambda log: idbench.fit(None), "is no log"),
-        (lambda log: idbench.fit([]), "name a log"),
-        (lambda log: idbench.fit(log, torque_delay=0.007), "torque_delay is how a log is read"),
-        (lambda log: idbench.fit(log, gain=2.0), "gain is how a log is read"),
-        (lambda log: idbench.fit(log, cutoff=True), "true and false are no values of it"),
-        (lambda log: idbench.fit(log, truth={"Fs1": 0.5}), "ZZR1, Fv1"),
-        (lambda log: idbench.fit(log, truth={"Fs9": 0.5}), "there is no parameter Fs9"),
-        (lambda log: idbench.read_log(None), "is no file"),
-        (idbench.fit_payload, "is no file"),
-        (lambda log: idbench.table1(motions=3), "unknown key 'motions'"),
-        (lambda log: idbench.fit(log, estimator="OLS").score("log.csv"), "cannot read the log log.csv"),
-        (lambda log: idbench.fit(log, estimator="OLS").score(3), "is no log"),
-        (lambda log: idbench.fit(log, estimator="OLS").predict([0, 0], [0], [0, 0]), "shapes"),
-    ],
-)
-def test_wrong_values_are_refused_by_name(files, call, words):
-    with pytest.raises((idbench.ExperimentError, idbench.IdentificationError)) as refused:
-        call(idbench.read_log(files / "first.parquet"))
-    assert words in str(refused.value)
-
-
 @pytest.mark.thorough
 def test_a_study_in_a_folder_goes_on_there(tmp_path):
     keys = {"seeds": 2, "chains": ["idbench"], "models": ["explicit"], "estimators": ["OLS"], "out": tmp_path / "kept"}
@@ -257,27 +233,6 @@ def test_a_study_in_a_folder_goes_on_there(tmp_path):
     np.testing.assert_array_equal(one.rows["run"], two.rows["run"])
     with pytest.raises(idbench.ExperimentError, match="holds another study"):
         idbench.study("encoder", **{**keys, "seeds": 3})
-
-
-@pytest.mark.parametrize(
-    ("keys", "words"),
-    [
-        ({"estimater": "OLS"}, "unknown key 'estimater' (did you mean 'estimator'?)"),
-        ({"estimator": "OSL"}, "no 'OSL' among the estimators"),
-        ({"estimator": 3.0}, "is none of the estimators"),
-        ({"estimator": "mine:Ridge"}, "no 'mine:Ridge' among the estimators"),
-        ({"cutoff": "fast"}, "cutoff = 'fast'"),
-        ({"cutoff": -1.0}, "cutoff"),
-        ({"torque": "late"}, "torque = 'late'"),
-        ({"validate": ["gone.csv"]}, "gone.csv"),
-        ({"gravity": [0, 0]}, "gravity"),
-        ({"friction": "sticky"}, "no law 'sticky'"),
-    ],
-)
-def test_wrong_keys_are_refused_by_name(files, keys, words):
-    with pytest.raises((idbench.ExperimentError, idbench.IdentificationError, idbench.BenchError)) as refused:
-        idbench.fit(files / "first.parquet", **keys)
-    assert words in str(refused.value)
 
 
 def test_results_are_tables_in_a_notebook(files):

@@ -82,21 +82,6 @@ def test_a_broken_contract_is_told(here, monkeypatch, capsys):
     assert "violates 1 of 3 parts of its contract" in told
 
 
-def test_what_cannot_be_begun_or_checked_is_refused(here, capsys):
-    def complaint(*words):
-        assert main(list(words)) == 2
-        return capsys.readouterr().err
-
-    assert "no kind of plug-in 'drives' (did you mean 'drive'?)" in complaint("new", "plugin", "x", "--kind", "drives")
-    assert "cannot be a name" in complaint("new", "study", "a b")
-    (here / "there.toml").write_text("")
-    assert "there.toml exists" in complaint("new", "scenario", "there")
-    assert "(did you mean 'GLS'?)" in complaint("check", "GSL")
-    assert "'none' is several plug-ins: prefilters/none, masks/none" in complaint("check", "none")
-    assert "cannot be made without arguments: ModuleNotFoundError" in complaint("check", "nowhere:Thing")
-    assert "is a plug-in of no point" in complaint("check", "pathlib:Path")
-
-
 def test_alone_it_says_what_there_is_to_do_in_ten_lines(capsys):
     assert main([]) == 0
     assert len([line for line in capsys.readouterr().out.splitlines() if line.strip()]) <= 10

@@ -89,27 +89,7 @@ def test_the_spring_of_mujoco_is_found(tmp_path, capsys):
     assert max(sprung["position_error_rms"]) < 0.01
 
 
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ("9=a:0.2,b:0.8", "there is no joint '9'"),
-        ("2=a:0.2", "b is missing"),
-        ("2=a:0.2,b:0.8,zeros:1", "did you mean 'zero'"),
-        ("2=a:0.2,b:0.8,a:1", "a is given twice"),
-        ("2=a:0.2,b:none", "b = 'none' must be a number"),
-        ("2=a:0.2,b:nan", "b = nan must be a finite number above 0"),
-        ("2=a:0.2,b:0.8,volume:0.3", "longer than the stroke of a whole turn, 0.4 m"),
-        ("2", "give a joint and the geometry"),
-    ],
-)
-def test_what_is_no_balancer_is_said(capsys, text, said):
-    assert main(["robot", "panda", "--balancer", text]) == 2
-    assert said in capsys.readouterr().err
-
-
-def test_a_joint_has_one_balancer_and_turns(capsys, tmp_path):
+def test_a_joint_with_a_balancer_turns(capsys, tmp_path):
     (tmp_path / "slide.xml").write_text(ARM.format(anchor="", eye="", tendon="").replace('"hip"', '"hip" type="slide"'))
     assert main(["robot", str(tmp_path / "slide.xml"), "--balancer", "hip=a:0.2,b:0.8"]) == 2
     assert "hip slides" in capsys.readouterr().err
-    assert main(["robot", "panda", "--balancer", "2=a:0.2,b:0.8", "joint2=a:0.2,b:0.9"]) == 2
-    assert "has a balancer already" in capsys.readouterr().err

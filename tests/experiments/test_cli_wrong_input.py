@@ -1,50 +1,12 @@
-"""Wrong input to the command line: one line each, exit code 2, nothing written."""
+"""Wrong input to the command line that takes more than a line of refusals.toml: one line each, exit code 2, nothing written."""
 
 import sys
 
 import pytest
 import tomli_w
 
-from idbench.experiments.cli import main
 from idbench.experiments.paper.table1 import SCENARIO
 from idbench.sim.scenario.scenario_file import load, to_dict
-
-
-def test_an_unknown_chain_lists_the_known_and_leaves_nothing(out, complaint):
-    line = complaint("table1", "--out", str(out), "--chain", "papre")
-    assert "no 'papre' among the chains (did you mean 'paper'?); known: paper, paper_masked, idbench" in line
-    assert not out.exists()
-    assert not list(out.parent.iterdir())
-
-
-def test_an_output_folder_that_cannot_be_written_is_told(tmp_path, complaint):
-    (tmp_path / "file").write_text("precious")
-    assert "is a file, not a folder" in complaint("table1", "--out", str(tmp_path / "file"))
-    assert "cannot write to" in complaint("table1", "--out", str(tmp_path / "file" / "below"))
-    assert (tmp_path / "file").read_text() == "precious"
-
-
-@pytest.mark.parametrize(
-    ("args", "message"),
-    [
-        (["table1", "--seed", "-1"], "seed = -1 must be 0 or a positive whole number"),
-        (["excite", "scara", "--prior", "file"], "--prior is for logs: a motion is designed for what it shows by itself"),
-        (["search", "--seed", "-1"], "seed = -1 must be 0 or a positive whole number"),
-        (["table1", "--out", "a" * 300], "File name too long"),
-        (["table1", "--seed", "1", "--scenario", "x.toml"], "name two trajectories: give one"),
-        (["table1", "--scenario", "nowhere.toml"], "cannot read scenario nowhere.toml"),
-        (["view", "README.md"], "there is no recording README.md"),
-        (
-            ["identify", "a.csv", "--validate", "b.csv", "--validate=c.csv"],
-            "give it once, and all its values if it takes several: --validate b.csv c.csv",
-        ),
-        (["run", "ideal", "--torque_delay", "1", "--torque-delay", "2"], "--torque-delay is given twice"),
-    ],
-)
-def test_more_wrong_input_is_one_line(args, message, tmp_path, monkeypatch, complaint):
-    monkeypatch.chdir(tmp_path)
-    assert message in complaint(*args)
-    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize(
@@ -72,12 +34,6 @@ def test_scenarios_that_make_no_sense_are_one_line(changes, message, tmp_path, c
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_a_folder_in_the_place_of_a_file_stops_all(out, complaint):
-    (out / "recording.rrd").mkdir(parents=True)
-    assert "holds recording.rrd, not written by idbench" in complaint("table1", "--out", str(out))
-    assert [path.name for path in out.iterdir()] == ["recording.rrd"]
-
-
 def test_view_tells_where_there_is_no_display(out, monkeypatch, complaint):
     out.mkdir()
     (out / "recording.rrd").write_bytes(b"RRF2")
@@ -85,19 +41,6 @@ def test_view_tells_where_there_is_no_display(out, monkeypatch, complaint):
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
     assert "there is no display here" in complaint("view", str(out))
-
-
-def test_search_says_where_it_cannot_write(tmp_path, complaint):
-    assert "there is no folder" in complaint("search", "--seed", "5", "--out", str(tmp_path / "nowhere" / "found.toml"))
-
-
-def test_view_needs_a_recording(tmp_path, complaint):
-    assert "there is no recording" in complaint("view", str(tmp_path))
-
-
-def test_wrong_words_exit_with_2(capfd):
-    assert main(["tabel1"]) == 2
-    assert capfd.readouterr().err.startswith("idbench: no command 'tabel1' (did you mean 'table1'?); known: ")
 
 
 def test_names_that_look_like_nothing_are_not_halved_and_a_layout_is_written_to_correct(tmp_path, complaint):

@@ -104,51 +104,9 @@ def test_one_model_and_an_estimated_delay(csv, capsys):
     assert then.startswith("next: ")
 
 
-def test_a_file_that_does_not_say_is_asked(csv, complaint):
-    assert "does not say what its torque means: add --torque held" in complaint("identify", str(csv))
-
-
-@pytest.mark.thorough
-@pytest.mark.parametrize(
-    ("args", "message"),
-    [
-        (["--torque-delay", "soon"], "--torque-delay soon must be seconds, such as 0.002, or estimate"),
-        (["--robot", "puma"], "no robot 'puma'; known: horn, panda, pendulum, puma560, scara, servo_arm, two_link"),
-        (["--chain", "papre"], "no 'papre' among the chains"),
-        (["--model", "powr"], "no 'powr' among the models (did you mean 'power'?)"),
-        (["--estimator", "LS"], "no 'LS' among the estimators"),
-    ],
-)
-def test_wrong_options_are_one_line(csv, args, message, complaint):
-    assert message in complaint("identify", str(csv), "--torque", "held", *args)
-
-
 def rewritten(csv, change):
     lines = csv.read_text().splitlines()
     csv.write_text("\n".join(change(lines)) + "\n")
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        (
-            lambda lines: lines[1:],
-            "put a line of names before it, such as t,q1,q2,tau1,tau2",
-        ),
-        (lambda lines: [lines[0].replace("tau2", "tau3"), *lines[1:]], "missing: tau2; unexpected: tau3"),
-        (lambda lines: [lines[0].replace("tau2", "tau1"), *lines[1:]], "tau1"),
-        (lambda lines: [*lines[:50], lines[50].rsplit(",", 1)[0] + ",nan", *lines[51:]], "tau is nan at sample 49 of joint 2"),
-        (lambda lines: [*lines[:50], lines[50].rsplit(",", 1)[0] + ",x", *lines[51:]], "column tau2 holds string, not numbers"),
-        (lambda lines: lines[:30], "the log has 29 samples"),
-        (lambda lines: [*lines[:50], *lines[53:]], "idbench resample"),
-        (lambda lines: [lines[0]], "holds no samples"),
-        (lambda lines: [*lines[:5], "1,2"], "cannot read the log"),
-    ],
-    ids=["no header", "wrong column", "twice", "nan", "text", "short", "gap", "empty", "ragged"],
-)
-def test_files_that_cannot_be_used_are_one_line(csv, change, message, complaint):
-    rewritten(csv, change)
-    assert message in complaint("identify", str(csv), "--torque", "held")
 
 
 def test_a_header_may_have_spaces_and_quotes_and_velocities(csv):
@@ -203,25 +161,6 @@ def test_what_no_healthy_log_shows_is_said(csv, capsys):
     assert "warning: Fs2 below zero in the explicit model" in printed.replace("Fv2, ", "")
     assert "nothing of tau2: are units, signs" in printed
     assert "0 is assumed" in printed
-
-
-def test_there_must_be_a_log_to_export(tmp_path, complaint):
-    assert "there is no log in" in complaint("export", str(tmp_path))
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"drive": {"kind": "averagd"}}, "drive.kind = 'averagd' is unknown"),
-        ({"robot": "nowhere.xml"}, "nowhere.xml"),
-        ({"controller": {"kind": "pd", "bandwidth": 200.0}}, "runs away"),
-    ],
-)
-def test_runs_that_cannot_be_made_are_one_line_and_leave_nothing(tmp_path, change, message, complaint):
-    path = tmp_path / "x.toml"
-    path.write_text(tomli_w.dumps({**to_dict(replace(load("ideal"), trajectory=SHORT)), **change}))
-    assert message in complaint("run", str(path), "--out", str(tmp_path / "out"))
-    assert list(tmp_path.iterdir()) == [path]
 
 
 def test_a_parameter_whose_truth_is_zero_is_reported(tmp_path):

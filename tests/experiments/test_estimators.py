@@ -90,12 +90,6 @@ def test_a_log_whose_loop_is_known_only_roughly_is_identified_by_instruments(idb
     assert "off1, off2 cannot be simulated" in err
 
 
-def test_a_run_has_no_start_that_nobody_uses(idbench, scenario):
-    code, _, err = idbench("run", scenario, "--estimator", "GLS", "--start", "file")
-    assert code == 2
-    assert "--start file: GLS needs no start; leave it out, or use --estimator IV or DIDIM" in err
-
-
 def test_a_loop_that_is_believed_and_wrong_is_told(idbench, ran, scenario, tmp_path):
     """A controller twice as stiff: DIDIM says that least squares does not agree. Of the true loop it says nothing."""
     wrong = tmp_path / "wrong.toml"
@@ -139,31 +133,6 @@ def test_links_may_be_near_those_of_the_file(idbench, ran, tmp_path):
     assert "as the log decides" in out
 
 
-@pytest.mark.parametrize(
-    ("words", "why"),
-    [
-        (("file:-3%",), "--prior file:-3%: write file, file:25%"),
-        (("Fs2=0.1",), "--prior Fs2=0.1: write file"),
-        (("Fs9=0.1:10%",), "there is no parameter 'Fs9' (did you mean"),
-        (("Ia1=0.3:10%",), "no base parameter is made of Ia1 alone (ZZR1 = ZZ1 + Ia1"),
-        (("Fs2=0.1:10%", "Fs2=0.2:10%"), "each name once"),
-        (("links=file:10%",), "write file:25% for links"),
-        (("Fs2=0:10%",), "Fs2 is 0, of which a share is nothing"),
-        (("ZZ2=0.06:10%", "M1=3:10%"), "no base parameter is made of M1 alone"),
-    ],
-)
-def test_priors_that_make_no_sense_are_refused(idbench, ran, words, why):
-    code, _, err = idbench("identify", ran, "--prior", *words, "--no-rerun")
-    assert code == 2
-    assert why in err
-
-
-def test_estimators_without_a_place_for_priors_are_named(idbench, ran):
-    code, _, err = idbench("identify", ran, "--prior", "file", "--estimator", "IV", "--no-rerun")
-    assert code == 2
-    assert "IV takes nothing that is known before; use --estimator GLS, WLS or OLS, or --hold" in err
-
-
 def test_a_base_parameter_may_be_roughly_known_and_a_short_log_loses_nothing(idbench, ran, tmp_path):
     """Three seconds, all models: Cond(W) of one of them is infinite, which JSON has no word for."""
     write_log(read_log(ran / "log.parquet").part(100, 470), tmp_path / "short.parquet")
@@ -173,12 +142,3 @@ def test_a_base_parameter_may_be_roughly_known_and_a_short_log_loses_nothing(idb
     found = json.loads((tmp_path / "short" / "summary.json").read_text())
     k = found["parameters"].index("ZZR1")
     assert found["models"]["explicit"]["sigma_noise"][k] <= 0.351
-
-
-def test_links_near_the_file_and_one_parameter_of_a_link_held_contradict(idbench, ran):
-    code, _, err = idbench("identify", ran, "--prior", "file", "--hold", "M2=2", "--no-rerun")
-    assert code == 2
-    assert "--prior file: M2 is held or tied" in err
-    code, _, err = idbench("robot", "scara", "--prior", "nonsense")
-    assert code == 2
-    assert "--prior nonsense: write file" in err

@@ -9,7 +9,6 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from idbench.experiments.cli import main
-from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.friction_laws import FrictionLaws
 from idbench.identify import OfJoints
 from idbench.identify.basis import StribeckFriction
@@ -34,34 +33,6 @@ def test_laws_are_named_for_all_joints_or_for_one():
     assert FrictionLaws.of(("auto",), JOINTS).auto
     (block,) = FrictionLaws.of(("stribeck:0.2",), JOINTS).blocks()
     assert block == StribeckFriction(0.2)
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("stribek", r"no law 'stribek' .did you mean 'stribeck'"),
-        ("standard+spring", "spring is no law of a joint's friction"),
-        ("3=load", "there is no joint '3'; there are 1 to 2: hip, knee"),
-        ("ankle=load", "there is no joint 'ankle'"),
-        ("stribeck:fast", "'fast' is no vs of stribeck"),
-        ("viscous:2", "viscous has no setting"),
-        ("cogging:-1", "periods = -1"),
-    ],
-)
-def test_what_is_no_law_is_refused(text, message):
-    with pytest.raises(ExperimentError, match=message):
-        FrictionLaws.of((text,), JOINTS).blocks()
-
-
-@pytest.mark.parametrize("words", [["robot", "scara"], ["excite", "scara"]])
-def test_without_a_log_there_is_nothing_to_choose_from(words, capsys):
-    assert main([*words, "--friction", "auto"]) == 2
-    assert "looks at a log, and there is none here" in capsys.readouterr().err
-
-
-def test_motions_are_designed_for_linear_laws(capsys):
-    assert main(["excite", "scara", "--friction", "standard+load"]) == 2
-    assert "designed for laws that are linear" in capsys.readouterr().err
 
 
 @pytest.mark.thorough

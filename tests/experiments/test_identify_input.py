@@ -53,23 +53,6 @@ def test_torques_that_are_zero_throughout(idbench, as_csv):
     assert "all torques are 0: there is nothing to identify" in err
 
 
-def test_a_log_is_not_judged_on_itself(idbench, logs, tmp_path):
-    log = read_log(logs / "first.parquet")
-    from idbench.identify.files.log_file import write_log
-
-    write_log(log.part(500, 3000), tmp_path / "part.parquet")
-    for other in (logs / "first.parquet", tmp_path / "part.parquet"):
-        code, _, err = idbench("identify", logs / "first.parquet", *NEEDED, "--validate", other)
-        assert code == 2
-        assert "holds the motion that is identified: give another motion" in err
-
-
-def test_names_in_another_case_are_guessed(idbench, logs):
-    code, _, err = idbench("identify", logs / "first.parquet", "--robot", "puma560", "--estimator", "wls")
-    assert code == 2
-    assert "(did you mean 'WLS'?)" in err
-
-
 @pytest.mark.thorough
 def test_one_models_failure_takes_nothing_from_the_others(idbench, logs, tmp_path):
     """A seventh of the log leaves the power model fewer rows than parameters; the explicit one has six times as many."""
@@ -106,55 +89,6 @@ def test_legs_are_pointed_out(idbench):
     assert code == 0, err
     assert "on a base that is fixed to the ground" in out
     assert "warning: 4 chains of joints start at the ground" in out
-
-
-@pytest.mark.parametrize("field", ["damping", "frictionloss", "armature"])
-def test_joints_that_would_drive_themselves_are_refused(idbench, tmp_path, field):
-    body = f'<joint name="hip" {field}="-0.1"/><geom size="0.1" pos="0.1 0 0"/>'
-    (tmp_path / "r.xml").write_text(f"<mujoco><worldbody><body>{body}</body></worldbody></mujoco>")
-    code, _, err = idbench("robot", "r.xml")
-    assert code == 2
-    assert f"joint hip has {field} = -0.1, which must be 0 or above" in err
-
-
-def test_a_payload_that_no_arm_carries(idbench, tmp_path):
-    (tmp_path / "pay.toml").write_text('name = "pay"\ntrajectory = "brisk"\n[payload]\nmass = 1e6\n')
-    code, _, err = idbench("run", "pay.toml")
-    assert code == 2
-    assert "payload.mass = 1000000.0: must be less than or equal to 100000" in err
-
-
-def test_all_that_is_wrong_in_a_scenario_is_told_at_once(idbench, tmp_path):
-    text = 'name = "m"\ndrive = 3\nrobot = 4\n[controller]\nkind = "pdd"\n[encoder]\nkind = "incremental"\nlinez = 3\n'
-    (tmp_path / "m.toml").write_text(text)
-    code, _, err = idbench("run", "m.toml")
-    assert code == 2
-    for part in (
-        "controller.kind = 'pdd'",
-        "drive = 3 must be a table",
-        "'encoder.linez'",
-        "robot = 4",
-        "'trajectory' is missing",
-    ):
-        assert part in err
-    assert "'drive' is missing" not in err
-
-
-def test_simulations_that_hardly_end_are_asked_about(idbench, tmp_path):
-    (tmp_path / "fine.toml").write_text('name = "fine"\ntrajectory = "brisk"\n[physics]\nstep = 1e-9\n')
-    code, _, err = idbench("run", "fine.toml")
-    assert code == 2
-    assert "makes 4.6e+10 physics steps of 1e-09 s: hours or days; if you mean it, add --yes" in err
-
-
-def test_grids_that_hardly_end_are_refused_at_once(idbench, tmp_path):
-    axes = "".join(
-        f'[[axes]]\nfield = "friction.{x}"\nlowest = 0.1\nhighest = 1.0\ncount = 10000\n' for x in ("coulomb", "viscous")
-    )
-    (tmp_path / "g.toml").write_text(f'name = "g"\nquestion = "?"\nscenario = "ideal"\nmotion = "shared"\n{axes}')
-    code, _, err = idbench("study", "g.toml", "--yes")
-    assert code == 2
-    assert "the grid has 100,000,000 combinations, more than 1,000,000" in err
 
 
 def test_a_joint_that_never_moves_does_not_keep_the_others_from_being_recorded(tmp_path, table1, capsys):

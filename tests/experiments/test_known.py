@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 import idbench
-from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.known import Known
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.requests.shared import Parameters
@@ -80,25 +79,6 @@ def test_known_parameters_of_another_robot_by_their_kinds():
     assert all(p.kind not in ("rotor inertia", "viscous friction", "Coulomb friction") for p in robot_model.basis.parameters)
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (("Ia9=0.1",), "no parameter 'Ia9'"),
-        (("Ia1",), "write NAME=VALUE"),
-        (("Ia1=much",), "write NAME=VALUE"),
-        (("Ia1=nan",), "write NAME=VALUE"),
-        (("=1",), "write NAME=VALUE"),
-        (("Fs1=1", "Fs1=2"), "Fs1 is given twice"),
-        (("links=3",), "links=file"),
-        (("links=file", "armatures=file", "friction=file"), "holds all parameters"),
-        (("Ia1=-1",), "armature"),
-    ],
-)
-def test_what_cannot_be_held_is_refused(words, message):
-    with pytest.raises((ExperimentError, idbench.sim.errors.BenchError), match=message):
-        _ = of(*words).basis
-
-
 def test_words_are_data():
     assert Known.of(("Ia3=0.1", "Fs2=file", "links=file")) == Known(("links",), {"Ia3": 0.1, "Fs2": None})
 
@@ -137,18 +117,3 @@ def test_a_tied_column_is_the_sum_of_both(rng):
     columns = {row: column for (row, at), column in tied.explicit(state).items() if at == place}
     np.testing.assert_array_equal(columns[0], qd[0])
     np.testing.assert_array_equal(columns[1], qd[1])
-
-
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (("Fv2",), "write NAME=NAME"),
-        (("Fv2=Fv1", "Fv2=Fv1"), "each name on the left once"),
-        (("Fv2=Fs1",), "cannot be equal"),
-        (("Fv2=Fv1", "Fv1=Fv2"), "tied itself"),
-        (("Fv9=Fv1",), "there is no parameter Fv9"),
-    ],
-)
-def test_what_cannot_be_tied_is_refused(words, message):
-    with pytest.raises(ExperimentError, match=message):
-        _ = RobotModel("scara", Parameters(tie=words)).basis

@@ -255,30 +255,6 @@ def test_the_command_that_shows_the_gains_is_said_in_full(files):
     assert any("--mass 3 --at X Y Z" in warning for warning in known.judgement.warnings(known.leading)["the payload"])
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (["payload", "full.parquet"], "--robot is missing"),
-        (["payload"], "name the logs with the payload, or --simulate SCENARIO"),
-        (["payload", "full.parquet", "--robot", "puma560"], "give logs without the payload (--unloaded), or the robot"),
-        (["payload", "full.parquet", "--robot", "puma560", "--before", "none.json"], "--before none.json: No such file"),
-        (["payload", "full.parquet", "--robot", "puma560", "--before", "full.parquet"], "holds no base parameters of an arm"),
-        (["payload", "full.parquet", "--robot", "puma560", "--at", "0", "0", "1"], "--at needs --mass"),
-        (["payload", "full.parquet", "--robot", "puma560", "--mass", "-2"], "--mass -2 must be above 0"),
-        (["payload", "full.parquet", "--robot", "puma560", "--write-mjcf", "arm.txt"], "its name must end with .xml"),
-        (["payload", "full.parquet", "--simulate", "payload"], "--simulate needs no logs"),
-        (["payload", "--simulate", "quantization"], "scenario quantization has no payload"),
-        (["payload", "--simulate", "payload", "--runs", "0"], "--runs 0 must be at least 1"),
-        (["gains", "full.parquet", "--unloaded", "empty.parquet", "--robot", "puma560"], "--mass is missing: the gains follow"),
-        (["gains", "full.parquet", "--robot", "puma560", "--mass", "2"], "there is no log without the payload"),
-    ],
-)
-def test_what_cannot_be_is_said(files, capsys, words, message):
-    del files
-    assert main(words) == 2
-    assert message in capsys.readouterr().err
-
-
 @pytest.mark.thorough
 def test_all_ways_are_compared_on_a_simulated_robot(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)

@@ -41,7 +41,3 @@ def test_identify_states_it(tmp_path, capsys):
     log = str(tmp_path / "run" / "log.parquet")
     assert main(["identify", log, "--torque", "held", "--wdyn", "2", "--no-rerun", "--verbose"]) == 0
     assert "wdyn 2 Hz (as stated); fs 50 wdyn" in capsys.readouterr().out
-
-
-def test_a_bandwidth_that_is_none_is_refused(complaint, tmp_path):
-    assert "--wdyn 0 must be above 0" in complaint("identify", str(tmp_path / "log.csv"), "--torque", "held", "--wdyn", "0")

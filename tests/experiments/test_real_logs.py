@@ -143,33 +143,6 @@ def test_a_chain_of_a_file(idbench, log, tmp_path):
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        (("--cutoff", "5", "--chain-file", "x.toml"), "--cutoff and --chain-file both say the band"),
-        (("--chain-file", "x.toml"), "--chain-file x.toml: No such file"),
-        (("--chain-file", "wrong.toml"), "operator.cutof = 3: FirLowPass has no such setting"),
-        (("--cutoff", "-3"), "cutoff"),
-        (("--lock", "joint9=1"), "there is no joint 'joint9'"),
-        (("--lock", "joint1"), "--lock joint1: give a joint and where it is held"),
-        (("--joints", "joint1"), "the log has positions of 6 joints, the robot 1 joint"),
-        (
-            ("--write", "arm.step"),
-            "--write arm.step: its name must end with .xml, .urdf, .sdf",
-        ),
-        (("--columns", "q"), "--columns q: give t="),
-        (("--units", "q=inch"), "--units: unit 'inch' of q is unknown"),
-        (("--rows", "t=x"), "--rows t=x: give columns and numbers"),
-    ],
-)
-def test_options_that_make_no_sense_are_told(complaint, logs, tmp_path, monkeypatch, options, message):
-    monkeypatch.chdir(tmp_path)
-    assert "is given twice" in complaint("identify", *[str(logs / "second.parquet")] * 2, *PUMA)
-    (tmp_path / "wrong.toml").write_text("[operator]\ncutof = 3\n")
-    assert message in complaint("identify", str(logs / "second.parquet"), *PUMA, *options)
-
-
-@pytest.mark.thorough
 def test_a_robot_with_more_joints_than_the_log(idbench, first, tmp_path):
     """The wrist was held: its columns are not in the log. What follows from them belongs to the forearm."""
     robot = Robot.load("puma560")
@@ -260,9 +233,3 @@ def test_a_log_is_shown_and_drawn(idbench, first, tmp_path):
     assert [row["joint"] for row in told["joints"]] == [f"joint {j + 1}" for j in range(6)]
     assert "logged velocities agree" in " ".join(told["notes"])
     assert (tmp_path / "log.png").read_bytes().startswith(b"\x89PNG")
-
-
-def test_what_a_log_is_not_is_told(complaint, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "words.csv").write_text("a,b,c\n" + "1,2,3\n" * 30)
-    assert "looks like positions and torques or currents; its columns: a, b, c" in complaint("log", "words.csv")

@@ -7,24 +7,6 @@ import pytest
 
 from idbench.identify import MotionLog
 from idbench.identify.files.log_file import read_log, write_log
-from idbench.sim.robot.robot import Robot
-
-
-@pytest.mark.parametrize(
-    ("robot", "message"),
-    [
-        ("panda", "the log has positions of 6 joints, the robot 7 joints: joint1, joint2"),
-        ("scara", "the log has positions of 6 joints, the robot 2 joints: joint1, joint2"),
-        ("kuka", "no robot 'kuka'; known: horn, panda, pendulum, puma560, scara, servo_arm, two_link"),
-        ("gone.xml", "gone.xml': No such file or directory"),
-    ],
-)
-def test_robots_that_do_not_fit(idbench, logs, robot, message):
-    code, out, err = idbench("identify", logs / "first.parquet", "--robot", robot)
-    assert code == 2
-    assert message in err
-    assert not out
-    assert err.count("\n") == 1
 
 
 @pytest.mark.thorough
@@ -67,20 +49,6 @@ def test_a_joint_that_stands_is_told_with_the_move_that_helps(idbench, changed):
     assert "Fv6  " not in out
 
 
-def test_files_are_not_written_where_they_would_be_lost(idbench, logs, tmp_path):
-    (tmp_path / "own.xml").write_text(Robot.path("puma560").read_text())
-    words = "identify", logs / "first.parquet", "--robot", "own.xml", "--write-mjcf"
-    for target, message in (
-        ("own.xml", "is a file that this command reads: choose another name"),
-        ("out.txt", "its name must end with .xml"),
-        ("no/such/out.xml", "there is no folder no/such"),
-    ):
-        code, out, err = idbench(*words, target)
-        assert code == 2
-        assert message in err
-        assert not out
-
-
 @pytest.mark.parametrize("extra", ['<joint name="[red]a" stiffness="5"/>', '<joint name="a[/x]" stiffness="5"/>'])
 def test_names_are_printed_as_they_are_and_springs_are_parameters(idbench, tmp_path, extra):
     site = '<actuator><motor site="s" gear="1 0 0 0 0 0" forcerange="-1 1"/></actuator>'
@@ -93,12 +61,6 @@ def test_names_are_printed_as_they_are_and_springs_are_parameters(idbench, tmp_p
     assert re.search(r"\bK1\b", out)
     code, _, err = idbench("robot", "r.xml", "--without", "XXR1" if "XXR1" in out else "XX1", "Fv1", "Fs1", "MX1", "MY1")
     assert code == 2
-
-
-def test_no_parameter_left_is_told(idbench):
-    code, _, err = idbench("robot", "scara", "--without", "ZZR1", "Fv1", "Fs1", "ZZ2", "LMX2", "LMY2", "Fv2", "Fs2")
-    assert code == 2
-    assert "there is no parameter left" in err
 
 
 @pytest.mark.thorough

@@ -8,7 +8,6 @@ import pytest
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.paper.job import TrajectorySearch
 from idbench.experiments.paper.table1 import SCENARIO, Table1
-from idbench.sim.errors import ScenarioError
 from idbench.sim.scenario.scenario_file import load
 
 pytestmark = pytest.mark.thorough
@@ -76,14 +75,3 @@ def test_it_never_sees_an_error_of_identification(robot):
 def test_it_gives_up_with_advice(robot):
     with pytest.raises(ExperimentError, match=r"in 2 rounds \(closest: .*; try another seed"):
         replace(TrajectorySearch(), tolerance=1e-9, rounds=2).run(robot)
-
-
-@pytest.mark.parametrize("settings", [{"smallest_move": 4.0}, {"clearance": 3.0}])
-def test_impossible_waypoints_are_told(settings, robot):
-    with pytest.raises(ScenarioError, match=r"no waypoint is .* lower smallest_move or clearance"):
-        TrajectorySearch(**settings).run(robot)
-
-
-def test_impossible_settings_are_told():
-    with pytest.raises(ExperimentError, match="motion = 0 must be above 0"):
-        TrajectorySearch(motion=0)

@@ -44,14 +44,6 @@ def test_files_of_a_device_are_read(idbench, tmp_path):
     assert json.loads(out)["covariance"]
 
 
-def test_unknown_devices_joints_and_names_of_files_are_refused(complaint, tmp_path):
-    assert "did you mean 'STS3215'" in complaint("device", "STS3251")
-    assert "no such joint" in complaint("device", "STS3215", "--joints", "knee", "--write-mjcf", str(tmp_path / "x.xml"))
-    assert "must end with .xml" in complaint("device", "STS3215", "--write-mjcf", str(tmp_path / "x.urdf"))
-    (tmp_path / "there.xml").write_text("mine")
-    assert "--force" in complaint("device", "STS3215", "--write-mjcf", str(tmp_path / "there.xml"))
-
-
 def test_devices_are_listed(capsys):
     assert main(["device"]) == 0
     assert "STS3215: GitHub kscalelabs/sysid" in capsys.readouterr().out

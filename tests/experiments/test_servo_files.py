@@ -1,7 +1,6 @@
 """Files of servos: what is stated, and logs of every format, each in a process of its own."""
 
 import json
-import pickle
 import subprocess
 import sys
 from types import SimpleNamespace
@@ -142,44 +141,11 @@ def test_times_of_any_kind(tmp_path, data, times, said):
     assert said in why
 
 
-@pytest.mark.parametrize("ending", ["pt", "h5", "json", "pkl", "xlsx"])
-def test_what_is_not_read_says_why(tmp_path, ending):
-    path = tmp_path / f"log.{ending}"
-    path.write_bytes(pickle.dumps([1, 2]))
-    with pytest.raises(LogError, match=rf"idbench reads no \.{ending}.*save"):
-        read_servo_log(path, {}, {})
-
-
 def test_a_position_that_is_shorter_than_a_command_is_named(tmp_path, data):
     t, q, command = data
     np.savez(tmp_path / "log.npz", t=t, q=q, command=command[:-3])
     with pytest.raises(LogError, match="60 samples of positions and 57 of commands"):
         read_servo_log(tmp_path / "log.npz", {}, {})
-
-
-GOOD = 'model = "STS3215"\nsupply = 12.0\nkp = 16\n'
-
-
-@pytest.mark.parametrize(
-    ("stated", "said"),
-    [
-        (GOOD.replace("12.0", "12000"), "takes at most 14 V"),
-        ("gain = 0.1\nsupply = 12000.0\n", "in millivolts"),
-        (GOOD + "counts = 4096.5\n", "must be a whole number"),
-        (GOOD + 'kind = "spring"\n', "kind = 'spring' is unknown"),
-        ('kind = "torque"\n', "kp is missing"),
-        ('kind = "torque"\nkp = 25\nduty_limit = 0.9\n', "is torque_limit"),
-        ('kind = "torque"\nkp = 25\nsupply = 12.0\n', "has none"),
-        ('kind = "torque"\nkp = 0\nkd = 0\n', "does not respond"),
-        (GOOD + "[joints.ankle]\nkp = 3\n", "no such joint"),
-        (GOOD + '[logs."z.csv"]\nkp = 3\n', "no log has that name"),
-    ],
-)
-def test_what_cannot_be_is_refused(tmp_path, stated, said):
-    path = tmp_path / "servo.toml"
-    path.write_text(stated)
-    with pytest.raises(ValueError, match=said):
-        ServoFile.read(path).require(NAMES, ["log.csv"])
 
 
 def test_a_torque_loop_knows_its_torques():

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from idbench.experiments.cli import main
-from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.friction_laws import FrictionLaws
 from idbench.identify import ESTIMATORS, AbstractEstimator, Estimate, MotionLog
 from idbench.identify.data.jumps import jumps
@@ -16,27 +15,11 @@ from idbench.identify.files.log_file import read_log, write_log
 from idbench.sim.engine.simulation import simulate
 from idbench.sim.robot.payload import Payload
 from idbench.sim.scenario.measurement import TorqueMeasurement
-from idbench.sim.scenario.scenario_file import load, to_toml
+from idbench.sim.scenario.scenario_file import load
 from idbench.sim.trajectories import RandomMoves
 
 HELD = "--torque", "held", "--torque-delay", "0"
 SCARA = "--robot", "scara", "--model", "explicit", "--no-rerun"
-
-
-@pytest.mark.parametrize(
-    ("texts", "message"),
-    [
-        (("standard", "load"), r"--friction standard load: both give the laws of all joints.*write standard\+load"),
-        (("1=standard", "1=load"), "both give the laws of that joint"),
-        (("none+standard",), "none is no friction at all"),
-        (("standard", "standard"), "the same is given twice"),
-        (("standard+auto",), "auto is no term of a sum"),
-        (("viscous+viscous",), "viscous is given twice in the sum"),
-    ],
-)
-def test_laws_of_friction_that_would_get_lost_are_refused(texts, message):
-    with pytest.raises(ExperimentError, match=message):
-        FrictionLaws.of(texts, ("joint1", "joint2"))
 
 
 def test_the_order_of_laws_does_not_matter():
@@ -186,25 +169,6 @@ def test_gains_are_of_what_was_logged_whatever_they_are_read_with(payload, idben
     assert "full.parquet: good" in out
 
 
-def test_limits_that_switch_checks_off_are_refused(tmp_path, complaint, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "far.toml").write_text("clearance = 1.0\n")
-    line = complaint("excite", "scara", "--limits", "far.toml", "--no-rerun")
-    assert "clearance = 1 m: " in line
-    assert "are never more than" in line
-    (tmp_path / "degrees.toml").write_text("[position]\njoint1 = [-60.0, 60.0]\n")
-    line = complaint("excite", "scara", "--limits", "degrees.toml", "--no-rerun")
-    assert "are these degrees? Then write [-1.047, 1.047]" in line
-
-
-def test_a_converter_that_sees_nothing_is_told(tmp_path, complaint, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    coarse = replace(load("ideal"), name="coarse", torque=TorqueMeasurement(resolution=(1e6,)))
-    (tmp_path / "coarse.toml").write_text(to_toml(coarse))
-    line = complaint("run", "coarse.toml", "--no-rerun")
-    assert "all torques of the log are 0: torque.resolution = 1e+06 N m is coarser than all of them" in line
-
-
 @pytest.fixture
 def scara_csv(log, tmp_path):
     """A log of the SCARA in CSV, to be changed."""
@@ -281,13 +245,6 @@ def test_a_quiet_joint_does_not_jump(quiet):
     assert not jumps(np.stack([quiet(t), other], axis=1), 100.0)
     slipped = quiet(t) + np.where(t > 15, 0.5, 0.0)
     assert [(jump.joint, jump.sample) for jump in jumps(np.stack([slipped, other], axis=1), 100.0)] == [(0, 1501)]
-
-
-def test_a_column_counts_once(complaint, scara_csv):
-    path = scara_csv()
-    line = complaint("identify", str(path), *SCARA, *HELD, "--columns", "q=q1,q1")
-    assert "column 'q1' is named twice as q" in line
-    assert "column 'q1' is named as q and as tau" in complaint("identify", str(path), *SCARA, *HELD, "--columns", "tau=q1,tau2")
 
 
 class Vandal(AbstractEstimator):

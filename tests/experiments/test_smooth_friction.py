@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 import idbench
-from idbench.experiments.errors import ExperimentError
 from idbench.sim import load_scenario, run
 from idbench.sim.trajectories import RandomMoves
 
@@ -58,13 +57,3 @@ def test_they_are_predicted_and_written(fits, tmp_path):
     assert "u1_1" not in repr(fit)
     with pytest.warns(UserWarning, match="smooth functions of friction have no place in the file"):
         fit.write(tmp_path / "arm.xml")
-
-
-def test_what_makes_no_sense_is_refused():
-    log = log_of(1, 0.0)
-    with pytest.raises(ExperimentError, match="smooth stands alone"):
-        idbench.fit(log, "scara", friction=("smooth", "1=standard+load"))
-    with pytest.raises(ExperimentError, match="IV takes nothing that is known before"):
-        idbench.fit(log, "scara", friction="smooth", estimator="IV")
-    with pytest.raises(ExperimentError, match="smooth looks at a log"):
-        idbench.load_robot("scara", friction="smooth").require_laws()

@@ -113,13 +113,6 @@ def test_no_torque_at_all_is_refused(csv, tmp_path):
         read_columns(saved(tmp_path / "log.csv", names, values))
 
 
-def test_all_joints_or_none_that_there_is_cannot_be_missing():
-    q = np.zeros((5, 2))
-    for missing in ((0, 1), (2,), (-1,)):
-        with pytest.raises(LogError, match="missing"):
-            MotionLog(100.0, q, q, TorqueChannel("held"), missing=missing)
-
-
 MOTOR = """<robot name="m"><link name="base"/><link name="rotor"><inertial><mass value="0.1"/>
 <inertia ixx="1e-5" iyy="1e-5" izz="1e-5" ixy="0" ixz="0" iyz="0"/></inertial></link>
 <joint name="shaft" type="continuous"><parent link="base"/><child link="rotor"/><axis xyz="0 0 1"/></joint></robot>"""

@@ -9,8 +9,7 @@ import pytest
 from builders import at, defects, matrix
 
 from idbench.experiments.identification.robot_model import RobotModel
-from idbench.identify import AbstractFriction, Basis, CoulombFriction, Parameter, TreeLinks, ViscousFriction, scara
-from idbench.identify.errors import SettingError
+from idbench.identify import AbstractFriction, CoulombFriction, TreeLinks, ViscousFriction, scara
 from idbench.sim.robot.inverse_dynamics import coulomb_torque, inverse_dynamics
 
 STATES = np.random.default_rng(5).uniform(-3, 3, (3, 2, 300))
@@ -70,20 +69,3 @@ def test_a_block_adds_its_parameters_behind_the_papers_order():
     assert basis.names == (*PAPER_ORDER, "Fq1", "Fq2")
     assert basis.units[-1] == "N m s^2/rad^2"
     assert max(defects(Drag(), ["Fq1", "Fq2"], *STATES)) < 1e-10
-
-
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (lambda: scara() + ViscousFriction(), "Fv1, Fv2 come from two blocks"),
-        (lambda: Basis(3, (TREE,)), "has 2 joints, not 3"),
-        (
-            lambda: Basis(2, (TREE,), (Parameter("XX", 4, "inertia", "kg m^2"),)),
-            "no block has the parameters XX5; they have XX1",
-        ),
-        (lambda: scara().without("ZZR2"), "there is no parameter ZZR2; there are ZZR1"),
-    ],
-)
-def test_contradictions_are_refused(make, message):
-    with pytest.raises(SettingError, match=message):
-        make()

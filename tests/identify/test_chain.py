@@ -16,14 +16,11 @@ from idbench.identify import (
     CoulombFriction,
     ExcitationError,
     ExplicitModel,
-    IdentificationError,
-    LogError,
     MotionLog,
     NoMask,
     PowerModel,
     Problem,
     ReversalMask,
-    SettingError,
     TorqueChannel,
     ViscousFriction,
     idbench_chain,
@@ -146,42 +143,6 @@ def test_a_joint_that_trembles_with_its_encoder_is_told_in_the_power_model(log, 
     q[:, 1] = rng.integers(0, 2, log.samples) * 2 * np.pi / 2**16
     with pytest.raises(ExcitationError, match="does not excite ZZR1"):
         identify(MotionLog(log.fs, q, log.tau, log.torque), scara(), PowerModel(), paper_chain())
-
-
-def test_a_robot_at_rest_is_refused(log):
-    rest = MotionLog(100.0, np.zeros((1000, 2)), np.zeros((1000, 2)), TorqueChannel("instantaneous"))
-    with pytest.raises(IdentificationError, match="0 rows are left by the mask for 8 parameters"):
-        identify(rest, scara(), ExplicitModel())
-
-
-def test_trim_must_cover_what_the_stages_look_at(log):
-    with pytest.raises(SettingError, match=r"trim = 0\.1 s is shorter than the 0\.44 s that this chain looks"):
-        identify(log, scara(), ExplicitModel(), replace(idbench_chain(), trim=0.1))
-
-
-@pytest.mark.parametrize(
-    ("samples", "chain", "message"),
-    [
-        (60, idbench_chain(), r"the log has 60 samples .* needs at least 98"),
-        (12, paper_chain(), r"the log has 12 samples .* needs at least 572"),
-        (500, paper_chain(), r"the log has 500 samples .* needs at least 572"),
-    ],
-)
-def test_short_logs_are_refused(samples, chain, message, log):
-    short = MotionLog(log.fs, log.q[:samples], log.tau[:samples], log.torque)
-    with pytest.raises(LogError, match=message):
-        identify(short, scara(), ExplicitModel(), chain)
-
-
-def test_a_log_of_other_joints_is_refused(log):
-    with pytest.raises(LogError, match="the log has 1 joints, the basis 2"):
-        identify(MotionLog(100.0, log.q[:, :1], log.tau[:, :1], log.torque), scara(), ExplicitModel())
-
-
-def test_a_chain_too_slow_for_the_log_is_refused(log):
-    crawling = MotionLog(8.0, log.q, log.tau, log.torque)
-    with pytest.raises(SettingError, match=r"operator cutoff = 5 Hz is not below the Nyquist frequency, 4 Hz"):
-        identify(crawling, scara(), ExplicitModel())
 
 
 def test_a_basis_may_be_part_of_a_robot(log):

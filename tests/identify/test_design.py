@@ -22,7 +22,6 @@ from idbench.identify.design.information import Information, predicted_informati
 from idbench.identify.design.plan import Plan
 from idbench.identify.design.search import DesignSearch, Greedy
 from idbench.identify.design.shapes import Shapes
-from idbench.identify.errors import SettingError
 
 X = np.array([3.5, 0.05, 0.5, 0.06, 0.12, 0.005, 0.01, 0.1])
 LEVELS = NoiseLevels(np.array([0.05, 0.02]), np.array([2e-5, 4e-5]))
@@ -97,11 +96,6 @@ def test_series_are_those_of_their_sines_and_cosines():
     mean, sines, cosines = Shapes.series(c, T)
     phase = 2 * np.pi * np.arange(1, 6) * t[:, None] / T
     np.testing.assert_allclose(Shapes.fourier(t, T, 5).at(c)[0], mean + np.sin(phase) @ sines + np.cos(phase) @ cosines)
-
-
-def test_a_series_of_one_harmonic_cannot_rest():
-    with pytest.raises(SettingError, match="1 harmonic of 5 s does not rest"):
-        Shapes.fourier(np.zeros(3), 5.0, 1)
 
 
 def test_search_finds_far_better_than_random_and_survives_an_interruption():

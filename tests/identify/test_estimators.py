@@ -210,12 +210,6 @@ def test_a_loop_that_is_not_that_of_the_log_is_refused(change, message, sixteen)
         ScenarioLoop.of(RobotModel(), (scenario,), (log, log))
 
 
-@pytest.mark.parametrize(("name", "message"), [("IV", "--loop"), ("CLOE", "--loop"), ("OE", "the caller gave no simulator")])
-def test_what_an_estimator_needs_is_asked_for(name, message, log):
-    with pytest.raises(IdentificationError, match=message):
-        identify(log, scara(), ExplicitModel(), estimator=ESTIMATORS.create(name))
-
-
 @pytest.mark.parametrize("name", ["CLIE", "CLOE", "OE", "UKF"])
 def test_what_compares_signals_takes_the_explicit_model(name, sixteen):
     with pytest.raises(IdentificationError, match="it has the explicit model alone"):

@@ -236,28 +236,6 @@ def test_what_cannot_be_guessed_is_told_in_one_line(tmp_path, write):
         read_columns(path, guess(path).layout)
 
 
-@pytest.mark.parametrize(
-    ("content", "message"),
-    [
-        ("[q]\ncolums = 1", r"colums in \[q\] is unknown; known: columns, unit, file, t, fs"),
-        ('[q]\nunit = "inch"', "unit 'inch' of q is unknown; known: rad, deg"),
-        ("[torque]\ndelay = 0.1", "a delay and no meaning"),
-        ("[t", "log.toml"),
-        ('[q]\ncolumns = "nothing*"', r"has no columns nothing\*; its columns: t, q1"),
-        ('[tau]\ncolumns = "gone"', "has no column 'gone'; its columns"),
-        ('[tau]\ncolumns = ["tau1", "tau2"]', "positions of 3 joints and torques of 2"),
-        ("rows = 3", "rows = 3 must be a table"),
-        ("[rows]\nt = 100.0", "t is 100.0 in no row; it goes from 0.0 to"),
-    ],
-)
-def test_a_layout_that_makes_no_sense_is_told_in_one_line(tmp_path, content, message):
-    text(tmp_path / "log.csv", numbered("q", "tau"), [T, Q, TAU])
-    (tmp_path / "log.toml").write_text(content)
-    with pytest.raises(LogError, match=message) as found:
-        read_columns(tmp_path / "log.csv")
-    assert "\n" not in str(found.value)
-
-
 @pytest.mark.parametrize("name", ["x.npz", "x.npy", "x.mat", "x.parquet", "x.bag", "x.db3", "x.csv.gz"])
 def test_files_that_are_something_else_are_told_in_one_line(tmp_path, name):
     (tmp_path / name).write_bytes(b"\x00no log\xff" * 20)
@@ -299,10 +277,3 @@ def test_no_pickle_is_loaded(tmp_path):
     np.save(tmp_path / "x.npy", np.array([{"a": 1}], dtype=object), allow_pickle=True)
     with pytest.raises(LogError, match="cannot read the log"):
         read_columns(tmp_path / "x.npy")
-
-
-@pytest.mark.parametrize("name", ["arm.urdf", "arm.XACRO", "arm.sdf"])
-def test_a_robot_in_the_place_of_a_log_is_told_apart(tmp_path, name):
-    (tmp_path / name).write_text("<robot/>")
-    with pytest.raises(LogError, match="the file of a robot, no log: give the log here"):
-        read_table(tmp_path / name)

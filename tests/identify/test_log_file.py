@@ -44,19 +44,9 @@ def test_unusable_files_are_refused(tmp_path, rng):
     (tmp_path / "text.parquet").write_text("t,q1\n")
     with pytest.raises(LogError, match="cannot read the log"):
         read_log(tmp_path / "text.parquet")
-    parquet.write_table(pa.table({"t": [0.0, 0.1], "q1": [0.0, 1.0], "q2": [0.0, 1.0]}), tmp_path / "half.parquet")
-    with pytest.raises(LogError, match="missing: tau1, tau2"):
-        read_log(tmp_path / "half.parquet")
     runs = MotionLog(100, rng.normal(size=(2, 9, 1)), rng.normal(size=(2, 9, 1)), TorqueChannel("held"))
     with pytest.raises(LogError, match="a file holds one run"):
         write_log(runs, tmp_path / "runs.parquet")
-
-
-@pytest.mark.parametrize("names", [("t", "q1", "q3", "tau1", "tau3"), ("t", "q1", "tau1", "tau2"), ("q1", "tau1")])
-def test_columns_that_do_not_pair_up_are_refused(tmp_path, names):
-    parquet.write_table(pa.table({name: np.arange(9) / 10 for name in names}), tmp_path / "log.parquet")
-    with pytest.raises(LogError, match=r"missing: |unexpected: "):
-        read_log(tmp_path / "log.parquet", TorqueChannel("held"))
 
 
 @pytest.mark.parametrize("said", [b"{}", b"text", b"[1]", b'{"meaning": "held", "delay": "x", "gain": 1}'])
@@ -92,16 +82,10 @@ def test_columns_may_be_separated_as_programs_do(tmp_path, text):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (
-            ROWS.encode(),
-            r"has no header, .*: put a line of names before it, such as t,q1,tau1, or say what its columns are in",
-        ),
         ("t,q1,tau1 [N·m]\n".encode("latin-1") + ROWS.encode(), "no UTF-8|invalid UTF8|must have a header"),
         ("t,q1,tau1\n0,0.1,Müll\n".encode("latin-1"), "column tau1 holds .*, not numbers|invalid UTF8"),
-        (b"t,q1,tau1\n0,0.1,0.2\n0.01,0.1,off\n", r"column tau1 holds string, not numbers: 'off' in line 3"),
-        (b"t,q1,tau1\n0,0.1,1e300\n0.01,0.1,0.2\n", "tau is 1e.300 at some instant, more than 1e.12, which is impossible"),
     ],
-    ids=["no header", "latin-1 header", "latin-1 cell", "text", "1e300"],
+    ids=["latin-1 header", "latin-1 cell"],
 )
 def test_odd_files_are_told_in_one_line(tmp_path, text, message):
     (tmp_path / "log.csv").write_bytes(text)
@@ -114,10 +98,3 @@ def test_without_pyarrow_it_says_what_is_missing(written, monkeypatch):
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     with pytest.raises(LogError, match="pip install pyarrow; or make a MotionLog of your own arrays"):
         read_log(written[1])
-
-
-def test_masked_arrays_are_refused_where_something_is_masked():
-    q = np.ma.masked_greater(np.arange(6.0).reshape(3, 2), 4)
-    with pytest.raises(LogError, match="q is masked at 1 places"):
-        MotionLog(100, q, np.zeros((3, 2)), TorqueChannel("held"))
-    assert MotionLog(100, np.ma.array(np.zeros((3, 2))), np.zeros((3, 2)), TorqueChannel("held")).samples == 3

@@ -94,8 +94,3 @@ def test_an_estimator_that_needs_rows_is_refused_a_log_too_long_for_them(log, mo
     with pytest.raises(IdentificationError, match="IRLS needs rows, and the rows of 4600 samples"):
         estimate(problem, ESTIMATORS.create("IRLS"))
     assert np.isfinite(estimate(problem, WeightedLeastSquares()).calibrated_sigma).all()
-
-
-def test_without_a_log_there_is_no_problem():
-    with pytest.raises(LogError, match="no log to identify"):
-        Problem((), scara(), ExplicitModel(), idbench_chain())

@@ -1,9 +1,8 @@
 """Logs made uniform: jittered, slower and faster, they are identified as before."""
 
-import numpy as np
 import pytest
 
-from idbench.identify import LogError, MotionLog, PowerModel, TimeError, TorqueChannel, identify, scara
+from idbench.identify import MotionLog, PowerModel, TimeError, identify, scara
 from idbench.identify.data.resample import resample
 from idbench.sim.engine.simulation import simulate
 from idbench.sim.scenario.scenario_file import load
@@ -35,17 +34,3 @@ def test_an_instantaneous_log_with_jittered_times_is_identified(log, table1, tru
     uniform = resample(t, reference.q, tau, log.torque, 100.0)
     # Straight lines between torques err by (w T)^2/8 of what varies at w = 20 rad/s, 0.5 %, mostly of both signs.
     assert identify(uniform, scara(), PowerModel()).relative_error_percent(truth).max() < 3
-
-
-@pytest.mark.parametrize(
-    ("t", "fs", "message"),
-    [
-        (np.arange(3) / 100, 100.0, "3 samples: at least 4"),
-        (np.array([0.0, 0.01, 0.01, 0.02]), 100.0, "time does not increase"),
-        (np.arange(4) / 100, 1e12, "1 to 1e"),
-    ],
-)
-def test_what_cannot_be_resampled_is_told(t, fs, message):
-    q = np.zeros((len(t), 2))
-    with pytest.raises(LogError, match=message):
-        resample(t, q, q, TorqueChannel("held"), fs)

@@ -78,22 +78,6 @@ def test_armature_on_joint_2_is_refused(robot):
         scara_truth(Robot("geared", spec.compile()))
 
 
-def test_unknown_robot_lists_the_known():
-    with pytest.raises(
-        RobotError, match=r"no robot 'scora'; known: horn, panda, pendulum, puma560, scara, servo_arm, two_link"
-    ):
-        Robot.load("scora")
-
-
-def test_missing_file_and_wrong_joint_are_refused(tmp_path):
-    with pytest.raises(RobotError, match=r"nowhere\.xml"):
-        Robot.load("nowhere.xml")
-    path = tmp_path / "ball.xml"
-    path.write_text('<mujoco><worldbody><body><joint name="hip" type="ball"/><geom size="1"/></body></worldbody></mujoco>')
-    with pytest.raises(RobotError, match="'hip' of body '' does not"):
-        Robot.load(str(path))
-
-
 @pytest.mark.parametrize(
     "change",
     [

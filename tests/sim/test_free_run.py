@@ -9,7 +9,7 @@ from idbench.identify.errors import InvariantError
 from idbench.sim.engine.driven import free_run, physics_of, replays
 from idbench.sim.engine.plant import Plant
 from idbench.sim.engine.simulation import simulate
-from idbench.sim.errors import RobotError, ScenarioError
+from idbench.sim.errors import RobotError
 from idbench.sim.robot.robot import Robot
 from idbench.sim.scenario.scenario import Physics
 from idbench.sim.scenario.scenario_file import load
@@ -38,12 +38,6 @@ def test_another_robot_does_not(log):
     robot.model.dof_damping[:] += 5.0
     measured, simulated = free_run(robot, log, qd, 0.5)
     assert (np.sqrt(((measured - simulated) ** 2).mean(axis=(0, 1))) > 0.02 * np.ptp(log.q, axis=0)).any()
-
-
-@pytest.mark.parametrize("length", [1e-5, 1e3])
-def test_stretches_that_a_log_does_not_have_are_refused(log, length):
-    with pytest.raises(ScenarioError, match="stretch"):
-        free_run(Robot.load("scara"), log, np.zeros_like(log.q), length)
 
 
 def changed(**fields):

@@ -129,22 +129,3 @@ def test_numbers_of_a_file_must_be_as_many_as_its_joints(tmp_path):
     path.write_text(BALLS.replace("<worldbody>", '<custom><numeric name="max_velocity" data="1"/></custom><worldbody>'))
     with pytest.raises(RobotError, match="max_velocity has 1 values for 2 joints"):
         Robot.load(str(path)).most("velocity")
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("velocty = 1", "unknown key 'velocty' (did you mean 'velocity'?)"),
-        ("velocity = -1", "velocity[0] = -1"),
-        ("velocity = ", "cannot read limits"),
-        ('[[keep_out]]\nname = "a"\nlowest = [0, 0, 1]\nhighest = [1, 1, 0]', "is not below highest"),
-    ],
-)
-def test_wrong_limits_are_told(tmp_path, text, message):
-    path = tmp_path / "limits.toml"
-    path.write_text(text)
-    with pytest.raises(ScenarioError) as error:
-        MotionLimits.read(path)
-    assert message in str(error.value)
-    with pytest.raises(ScenarioError, match="cannot read limits"):
-        MotionLimits.read(tmp_path / "nowhere.toml")

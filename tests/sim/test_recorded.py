@@ -74,12 +74,6 @@ def test_files_that_are_no_motion_are_told(rows, options, message, tmp_path, rob
         Recorded(file=str(tmp_path / "motion.csv"), **options).plan(robot)
 
 
-@pytest.mark.parametrize(("file", "why"), [("nowhere.csv", "No such file or directory"), (".", "Is a directory")])
-def test_a_file_that_is_not_there_is_told(file, why, robot):
-    with pytest.raises(ScenarioError, match=f"cannot read the motion .*: {why}"):
-        Recorded(file=file).plan(robot)
-
-
 def test_a_file_is_found_from_any_folder(planned, robot, tmp_path, monkeypatch):
     """A joint that is held, names in quotation marks, the mark of a file's encoding, and a blank line are no trouble."""
     monkeypatch.chdir(tmp_path)

@@ -153,22 +153,6 @@ def test_a_log_has_commands_and_when_torque_was_off(tmp_path):
     np.testing.assert_array_equal(columns.on[:, 0] > 0.5, ~off)
 
 
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
-        ({"controller": {"kind": "pd"}}, "commands a torque, this drive takes a position"),
-        ({"drive": {"kind": "ideal"}}, "commands a position, this drive takes a torque"),
-        ({"torque": {"source": "reference"}}, "source must be 'current'"),
-        ({"drive": {"kind": "servo", "off": [[2.0, 1.0]]}}, "from one instant to a later one"),
-        ({"drive": {"kind": "servo", "backlash": [-0.1]}}, "backlash"),
-    ],
-    ids=str,
-)
-def test_scenarios_that_make_no_servo(changes, message):
-    with pytest.raises(ScenarioError, match=message):
-        from_dict(to_dict(load("servo")) | changes)
-
-
 def test_joints_of_one_body_have_no_play(tmp_path):
     file = tmp_path / "cross.xml"
     file.write_text(

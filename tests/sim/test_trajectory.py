@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from scipy.interpolate import BPoly
 
-from idbench.sim.errors import ScenarioError
 from idbench.sim.trajectories import PointToPoint
 from idbench.sim.trajectories.point_to_point import PEAK_VELOCITY
 
@@ -63,18 +62,3 @@ def test_the_fastest_moves_reach_a_limit_and_pass_none(limit):
     first = t <= moves.durations[0]
     assert used[first].max() == pytest.approx(1, abs=1e-6)
     assert used[~first].max() == pytest.approx(1, abs=1e-6)
-
-
-@pytest.mark.parametrize(
-    ("points", "durations", "dwells", "message"),
-    [
-        ([[0.0, 1.0]], [], [0.0], r"shape \(1, 2\), not \(at least 2, joints\)"),
-        ([[0.0], [1.0]], [1.0, 2.0], [0.0, 0.0], "2 waypoints need 1 durations and 2 dwells"),
-        ([[0.0], [1.0]], [0.0], [0.0, 0.0], "durations must be above 0 s"),
-        ([[0.0], [1.0]], [1.0], [0.0, -1.0], "dwells not below"),
-        ([[0.0], [np.nan]], [1.0], [0.0, 0.0], "waypoints hold a value that is not finite"),
-    ],
-)
-def test_impossible_motions_are_refused(points, durations, dwells, message):
-    with pytest.raises(ScenarioError, match=message):
-        PointToPoint(np.array(points), np.array(durations), np.array(dwells))

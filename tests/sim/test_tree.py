@@ -118,15 +118,6 @@ def test_a_floating_base_is_held_and_joints_without_names_get_some(written):
     np.testing.assert_allclose(inverse_dynamics(held, *q), inverse_dynamics(fixed, *q), atol=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("name", "message"),
-    [("kuka", "no robot 'kuka'; known: horn, panda, pendulum, puma560, scara, servo_arm, two_link"), ("no.xml", "cannot read")],
-)
-def test_robots_that_are_not_there(name, message):
-    with pytest.raises(RobotError, match=message):
-        Robot.load(name)
-
-
 def test_a_urdf_needs_no_meshes(written):
     shape = '<visual><geometry><mesh filename="package://gone/visual.dae"/></geometry></visual>'
     inertial = '<inertial><mass value="2"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'

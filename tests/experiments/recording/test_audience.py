@@ -35,14 +35,6 @@ def free():
         return server.getsockname()[1]
 
 
-@pytest.mark.parametrize(
-    "url", ["127.0.0.1:9876", "http://127.0.0.1:9876/proxy", "rerun+http://:9876", "rerun+http://a:b", "x"]
-)
-def test_an_address_that_is_none_is_told(complaint, out, url):
-    assert f"--connect {url} is no address of a viewer" in complaint("run", "ideal", "--connect", url, "--out", str(out))
-    assert not out.exists()
-
-
 def test_a_viewer_that_does_not_answer_is_told_before_anything_is_simulated(complaint, out, free):
     url = NOBODY.format(port=free)
     assert f"no viewer answers at {url}" in complaint("run", "ideal", "--connect", url, "--out", str(out))
@@ -59,24 +51,6 @@ def test_a_missing_display_is_told(complaint, out, monkeypatch):
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
     assert "there is no display here: use --serve" in complaint("run", "ideal", "--live", "--out", str(out))
-
-
-@pytest.mark.parametrize(
-    ("options", "said"),
-    [
-        (["--live", "--serve"], "--live and --serve name several viewers"),
-        (["--pace", "1"], "--pace 1 needs somebody who watches"),
-        (["--serve", "--pace", "0"], "--pace 0 must be above 0"),
-        (["--serve", "--pace", "nan"], "--pace nan must be above 0"),
-        (["--serve", "--no-rerun"], "--serve and --no-rerun contradict"),
-        (["--serve", "--port", "99999"], "--port 99999 must be between"),
-        (["--inner", "3", "2"], "--inner 3 2 must be two times"),
-        (["--inner", "1", "2", "--no-rerun"], "needs a recording"),
-    ],
-)
-def test_options_that_make_no_sense_are_told(complaint, out, options, said):
-    assert said in complaint("run", "ideal", "--out", str(out), *options)
-    assert not out.exists()
 
 
 @pytest.mark.thorough
@@ -151,11 +125,6 @@ def test_a_viewer_that_hangs_keeps_nothing_back(tmp_path, reading):
     assert said_of_viewers(done.stderr) == [f"idbench: the viewer at {url} takes nothing; the work goes on without it"]
     assert "written to run" in done.stdout
     reading.verify(tmp_path / "run" / "recording.rrd")
-
-
-def test_a_host_that_cannot_be_one_does_not_answer(complaint, out):
-    url = "rerun+http://a..b:9876/proxy"
-    assert f"no viewer answers at {url}" in complaint("run", "ideal", "--connect", url, "--out", str(out))
 
 
 @pytest.mark.thorough

@@ -57,21 +57,6 @@ def test_more_logs_make_errors_smaller(content):
     assert one / 5 < four < 1.3 * one / 2
 
 
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"realizations": 2, "bound": True}, "bound = true"),
-        ({"rows": "equal", "estimators": ["DIDIM"]}, "simulates the loop of one log"),
-        ({"data": "ideal", "motion": "shared"}, "motion = 'shared'"),
-        ({"realizations": 0}, "realizations"),
-        ({"rows": "fair"}, "rows"),
-    ],
-)
-def test_what_does_not_go_together_is_refused(content, change, message):
-    with pytest.raises(StudyError, match=message):
-        study_from({**content, **change}, "study")
-
-
 def test_ideal_data_are_exact(content):
     """Of noise-free moves along polynomials nothing is left of chain idbench's errors."""
     content["settings"] = {"trajectory": content["settings"]["trajectory"]}

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from idbench.experiments.errors import StudyError
 from idbench.experiments.study.shard import run_shard
 from idbench.experiments.study.study_file import load_study, study_from
 
@@ -55,18 +54,3 @@ def test_a_joint_that_does_not_move_has_a_reason():
     still = SHORT | {"settings": {"trajectory": {"kind": "steps", "steps": 4, "reach": 0.001}}}
     rows = run_shard(study_from(still, "study"), range(2)).rows
     assert all("does not move" in row["failure"] for row in rows)
-
-
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
-        ({"models": ["explicit"]}, "a study of servos has models"),
-        ({"scenario": "arm", "settings": {}}, "a study of servos has models"),
-        ({"friction": ["stiction"]}, "friction 'stiction' is unknown"),
-        ({"friction": ["load+leed"]}, "no parameter 'leed'"),
-    ],
-    ids=str,
-)
-def test_studies_that_make_no_sense(changes, message):
-    with pytest.raises(StudyError, match=message):
-        study_from(SHORT | changes, "study")

@@ -13,7 +13,6 @@ from idbench.experiments.study.axis import Axis
 from idbench.experiments.study.study_file import load_study, names, study_from, study_from_text
 from idbench.identify import IirLowPass, NoMask
 from idbench.sim.drives import AveragedDrive
-from idbench.sim.errors import ScenarioError
 
 
 def axes(content, *more, **first):
@@ -126,61 +125,6 @@ def test_every_study_that_ships_can_be_run(name):
     assert study.question.endswith("?")
     assert len(study.points) * study.seeds == study.size
     assert study.methods
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"axes": []}, "axes is empty"),
-        ({"axes": [{"field": "fs", "values": 50.0}]}, r"axis fs: values = 50.0 must be a list"),
-        ({"setings": {}}, r"unknown key 'setings' \(did you mean 'settings'\?\)"),
-        ({"axes": [{"field": "encoder.lines"}]}, "axis encoder.lines is empty: give values"),
-        ({"axes": [{"field": "encoder.lines", "values": []}]}, "is empty"),
-        ({"axes": [{"field": "encoder.line", "values": [1]}]}, r"unknown key 'encoder.line' \(did you mean 'lines'\?\)"),
-        ({"axes": [{"field": "encoder.lines", "values": [-4]}]}, "encoder.lines.* = -4"),
-        ({"axes": [{"field": "encoder.lines", "values": [4, 4]}]}, "a value is given twice"),
-        ({"axes": [{"field": "encoder", "values": [4]}]}, "axis encoder is a table of settings"),
-        ({"axes": [{"field": "fs.x", "values": [4]}]}, "axis fs.x: fs is no table"),
-        ({"axes": [{"field": "fs", "values": [50.0], "lowest": 1.0}]}, "give values, or lowest, highest and count"),
-        ({"axes": [{"field": "fs", "lowest": 5.0, "highest": 1.0, "count": 3}]}, "lowest must be below highest"),
-        ({"axes": [{"field": "fs", "lowest": 0.0, "highest": 1.0, "count": 3, "spacing": "log"}]}, "above 0"),
-        ({"axes": [{"field": "fs", "lowest": 1.0, "highest": 2.0, "count": 10**9}]}, "count between 2 and"),
-        ({"axes": [{"field": "fs", "values": [100, 100.0]}]}, "a value is given twice"),
-        ({"axes": [{"field": "fs", "lowest": 100.0, "highest": 100.0001, "count": 5}]}, "a value is given twice"),
-        (
-            {"axes": [{"field": "fs", "values": [50.0], "also": ["chain.trim"]}]},
-            "mixes settings of simulation and identification",
-        ),
-        ({"axes": 3}, r"write \[\[axes\]\]"),
-        ({"axes": [{"field": "chain.operator", "values": [{"cutoff": 2.0}]}]}, "give names, among fir"),
-        ({"axes": [{"field": "seed", "values": [1, 2]}]}, "an axis varies seed"),
-        ({"axes": [{"field": "fs", "values": [50.0]}, {"field": "fs", "values": [60.0]}]}, "two axes vary fs"),
-        ({"axes": [{"field": "chain.operatr.cutoff", "values": [1.0]}]}, r"no such setting \(did you mean 'operator'\?\)"),
-        ({"axes": [{"field": "chain.operator.order", "values": [1]}]}, "FirLowPass has no such setting.*cutoff, transition"),
-        ({"axes": [{"field": "chain.operator.cutoff", "values": [-1.0]}]}, "cutoff = -1.0"),
-        ({"axes": [{"field": "chain.operator", "values": ["firr"]}]}, "no 'firr' among the operators"),
-        ({"models": ["explicit", "powr"]}, "no 'powr' among the models"),
-        ({"models": ["power", "power"]}, "a name is given twice"),
-        ({"chains": ["x"]}, "no 'x' among the chains"),
-        ({"estimators": []}, "estimators"),
-        ({"seeds": 1}, "seeds = 1"),
-        ({"chain": ["idbench"]}, r"unknown key 'chain' \(did you mean 'chains'\?\)"),
-        ({"scenario": "idael"}, r"no scenario 'idael' \(did you mean 'ideal'\?\)"),
-        ({"scenario": 3}, "'scenario' must name a scenario"),
-        ({"settings": {"encoder": {"kind": "incremental", "line": 3}}}, "unknown key 'encoder.line'"),
-        ({"settings": {"encoder": {"kind": "incremental"}}}, "needs a trajectory of kind random"),
-        ({"name": "a/b"}, "name"),
-    ],
-)
-def test_a_wrong_study_is_refused_by_naming_what_is_wrong(content, change, message):
-    with pytest.raises((StudyError, ScenarioError), match=message):
-        _ = study_from(content | change, "study").points
-
-
-def test_a_combination_that_makes_no_sense_is_refused(content):
-    """The first is right, the second is not."""
-    with pytest.raises(ScenarioError, match="delay"):
-        _ = study_from(axes(content, {"field": "timing.delay", "values": [0.001, 2.0]}), "study").points
 
 
 def test_there_is_no_run_beyond_the_last(small):
