@@ -15,6 +15,10 @@ from idbench.identify import IirLowPass, NoMask
 from idbench.sim.drives import AveragedDrive
 from idbench.sim.errors import ScenarioError
 
+LINES = {"field": "encoder.lines", "values": [2048]}
+RANDOM = {"kind": "random", "moves": 3}
+QUINTIC = {"kind": "quintic", "waypoints": [[0.0, 0.0], [1.0, 1.0]], "durations": [1.0], "rest": 0.5}
+
 
 def axes(content, *more, **first):
     """Return the study with the fields of its first axis changed, and more axes."""
@@ -74,14 +78,6 @@ def test_values_are_numbers_or_words_but_not_both(content):
     assert not noise.numeric
     assert [noise.label(x) for x in noise.points] == ["0.1", "[0.1, 0.01]"]
     assert Axis(field="x", values=[True, False]).numeric is False
-
-
-def test_every_combination_is_looked_at(content):
-    quintic = {"kind": "quintic", "waypoints": [[0.0, 0.0], [1.0, 1.0]], "durations": [1.0], "rest": 0.5}
-    random = content["settings"]["trajectory"]
-    study = study_from(axes(content, {"field": "trajectory", "values": [random, quintic]}), "study")
-    with pytest.raises(StudyError, match="needs a trajectory of kind random"):
-        _ = study.points
 
 
 def test_a_range_is_even(content):
@@ -170,17 +166,28 @@ def test_every_study_that_ships_can_be_run(name):
         ({"settings": {"encoder": {"kind": "incremental", "line": 3}}}, "unknown key 'encoder.line'"),
         ({"settings": {"encoder": {"kind": "incremental"}}}, "needs a trajectory of kind random"),
         ({"name": "a/b"}, "name"),
+        ({"realizations": 2, "bound": True}, "bound = true"),
+        ({"rows": "equal", "estimators": ["DIDIM"]}, "simulates the loop of one log"),
+        ({"data": "ideal", "motion": "shared"}, "motion = 'shared'"),
+        ({"realizations": 0}, "realizations"),
+        ({"rows": "fair"}, "rows"),
+        ({"data": "ideal"}, "a scenario with encoder"),
+        ({"data": "ideal", "realizations": 2}, "ideal logs of a motion are all the same"),
+        ({"axes": [{"field": "model", "cases": {"a": {}, "b": {"fs": 50.0}}}]}, "column of the results"),
+        ({"axes": [{"field": "ZZR1", "cases": {"a": {}, "b": {"fs": 50.0}}}]}, "which is a parameter"),
+        ({"axes": [{"field": "", "values": [1]}]}, "field is empty"),
+        ({"axes": [{"field": "x", "cases": {"a": {"fs": 50.0}}}, {"field": "fs", "values": [50.0]}]}, "two axes vary fs"),
+        ({"axes": [{"field": "x", "cases": {"a": {"trajectory": {"seed": 5}}}}]}, "which a study draws itself"),
+        (
+            {"axes": [LINES, {"field": "timing.delay", "values": [0.001, 2.0]}]},
+            "delay",
+        ),  # of the second point
+        ({"axes": [LINES, {"field": "trajectory", "values": [RANDOM, QUINTIC]}]}, "needs a trajectory of kind random"),
     ],
 )
 def test_a_wrong_study_is_refused_by_naming_what_is_wrong(content, change, message):
     with pytest.raises((StudyError, ScenarioError), match=message):
         _ = study_from(content | change, "study").points
-
-
-def test_a_combination_that_makes_no_sense_is_refused(content):
-    """The first is right, the second is not."""
-    with pytest.raises(ScenarioError, match="delay"):
-        _ = study_from(axes(content, {"field": "timing.delay", "values": [0.001, 2.0]}), "study").points
 
 
 def test_there_is_no_run_beyond_the_last(small):
