@@ -4,12 +4,16 @@ import json
 import re
 import subprocess
 
+import numpy as np
 import pytest
 
 from idbench.experiments.cli import main
 from idbench.experiments.cli.app import COMMANDS
 from idbench.experiments.paper.table1 import SCENARIO
+from idbench.experiments.plugin_tables import TABLES
+from idbench.experiments.requests.shared import CHAIN, ESTIMATOR
 from idbench.experiments.results.writing import NAME as MANIFEST
+from idbench.identify import CHAINS, ESTIMATORS, MODELS, identify, scara
 from idbench.identify.files.log_file import read_log
 from idbench.sim.scenario.scenario_file import from_dict, load
 
@@ -17,20 +21,8 @@ from idbench.sim.scenario.scenario_file import from_dict, load
 def test_table1_prints_and_writes_everything(out, capsys):
     assert main(["table1", "--out", str(out)]) == 0
     printed = capsys.readouterr().out
-    for text in (
-        "explicit model",
-        "implicit model",
-        "power model",
-        "energy model",
-        "integral model",
-        "The paper's conclusion, with 95 % confidence intervals",
-        "0.649",
-        "3.502",
-        "Cond(W)",
-        "rows",
-        "all three",
-    ):
-        assert text in printed
+    assert all(f"{name} model" in printed for name in MODELS)
+    assert all(text in printed for text in ("The paper's conclusion, with 95 % confidence intervals", "0.649", "3.502"))
     recording = [f"recording.{name}-OLS.rrd" for name in ("idbench", "paper", "paper_masked")] + ["recording.rrd"]
     assert sorted({x.name for x in out.iterdir()} - {MANIFEST}) == ["log.parquet", *recording, "summary.json"]
     summary = json.loads((out / "summary.json").read_text())
@@ -82,18 +74,8 @@ def test_search_writes_a_scenario(tmp_path, capsys):
 def test_list_shows_every_plugin_with_a_line(capsys):
     assert main(["list"]) == 0
     printed = capsys.readouterr().out
-    for name in (
-        "coulomb",
-        "explicit",
-        "butterworth",
-        "central",
-        "reversal",
-        "windows",
-        "modulating",
-        "idbench",
-        "OLS",
-    ):
-        assert name in printed
+    for table in TABLES:
+        assert all(re.search(rf"^ *{name} +\S", printed, re.MULTILINE) for name in table.builtin)
 
 
 def test_version(capsys):
@@ -140,3 +122,10 @@ def test_bash_completes_what_is_typed(tmp_path, capsys):
     done"""
     done = subprocess.run(["bash", "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True)
     assert done.stdout.split() == ["1", "identify", "1", "--torque-delay", "1", "--armature", "1", "idbench.bash"]
+
+
+def test_the_command_lines_defaults_are_those_of_python(log):
+    """To the bit: another estimator, or another chain, gives other parameters."""
+    model = MODELS.create("explicit")
+    named = identify(log, scara(), model, CHAINS.create(CHAIN), ESTIMATORS.create(ESTIMATOR))
+    np.testing.assert_array_equal(identify(log, scara(), model).X, named.X)

@@ -2,7 +2,6 @@
 
 import json
 import re
-import runpy
 
 import numpy as np
 import pytest
@@ -205,30 +204,6 @@ def test_torques_that_do_not_see_rotors_are_told_apart(idbench, logs, first, tmp
     code, out, _ = idbench(*words, "--armature", "none", "--friction", "none", "--out", "out")
     assert code == 0
     assert not [name for name in found(tmp_path / "out")["parameters"] if name.startswith(("Ia", "Fv", "Fs"))]
-
-
-@pytest.mark.thorough
-def test_what_is_written_makes_the_torques_that_were_identified(idbench, logs, tmp_path):
-    """The function for a controller, against MuJoCo's inverse dynamics of the robot that is written beside it."""
-    code, _, _ = idbench(
-        "identify", logs / "first.parquet", *PUMA, "--no-rerun", "--model", "explicit", "--write-mjcf", "arm.xml", "--write",
-        "arm.py", "arm.json", "arm.urdf",
-    )  # fmt: skip
-    assert code == 0
-    written, function = Robot.load(str(tmp_path / "arm.xml")), runpy.run_path(str(tmp_path / "arm.py"))
-    rng = np.random.default_rng(0)
-    q, qd, qdd = (rng.uniform(-1, 1, (20, 6)) for _ in range(3))
-    tau = inverse_dynamics(written, q, qd, qdd) + coulomb_torque(written, qd)
-    # The physically consistent bodies are some sigma from the estimate, which the function has as it is.
-    assert np.abs(function["inverse_dynamics"](q, qd, qdd) - tau).max() < 0.01 * np.abs(tau).max()
-    assert function["JOINTS"] == written.joints
-    np.testing.assert_allclose(function["inverse_dynamics"](q[0], qd[0], qdd[0]), function["inverse_dynamics"](q, qd, qdd)[0])
-    urdf = Robot.load(str(tmp_path / "arm.urdf"))
-    again = inverse_dynamics(urdf, q, qd, qdd) + coulomb_torque(urdf, qd)  # rotors included
-    np.testing.assert_allclose(again, tau, atol=1e-5 * np.abs(tau).max())  # angles of a URDF become quaternions
-    base = json.loads((tmp_path / "arm.json").read_text())
-    assert len(base["covariance"]) == len(base["parameters"]) == 52
-    assert base["parameters"][0]["made_of"]
 
 
 @pytest.mark.thorough

@@ -43,28 +43,6 @@ def test_identify_validates_and_writes_the_file(idbench, logs, tmp_path):
 
 
 @pytest.mark.thorough
-def test_without_a_second_log_the_end_of_the_first_is_held_out(idbench, logs):
-    code, out, _ = idbench("identify", logs / "first.parquet", "--robot", "puma560", "--model", "explicit")
-    assert code == 0
-    assert "the last quarter of the log, by a fit of the rest" in out
-
-
-@pytest.mark.thorough
-def test_run_takes_any_robot(idbench, tmp_path):
-    arm = load("arm")
-    scenario = replace(arm, name="short", fs=250.0, trajectory=replace(arm.trajectory, moves=8))
-    (tmp_path / "short.toml").write_text(to_toml(scenario))
-    code, out, err = idbench("run", "short.toml", "--robot", "puma560", "--out", "mine", "--estimator", "WLS")
-    assert code == 0, err
-    summary = json.loads((tmp_path / "mine" / "summary.json").read_text())
-    assert summary["robot"] == "puma560"
-    assert len(summary["truth"]) == 52
-    code, out, err = idbench("identify", "mine", "--model", "explicit", "--label", "again")
-    assert code == 0, err
-    assert "added to the recording" in out
-
-
-@pytest.mark.thorough
 def test_a_fixed_trajectory_of_another_robot_is_replaced(idbench, tmp_path):
     (tmp_path / "two.toml").write_text(to_toml(replace(load("ideal"), name="two", fs=100.0)))
     code, out, err = idbench("run", "two.toml", "--robot", "panda", "--no-rerun", "--estimator", "WLS")
