@@ -34,19 +34,16 @@ def test_table1_prints_and_writes_everything(out, capsys):
 
 
 @pytest.mark.thorough
-def test_table1_repeats_itself(tmp_path, capsys):
-    for name in ("a", "b"):
-        main(["table1", "--out", str(tmp_path / name), "--seed", "5"])
-    a, b = (json.loads((tmp_path / name / "summary.json").read_text()) for name in ("a", "b"))
+def test_table1_repeats_itself(ran):
+    a, b = (ran("table1 --seed 5 --out kept").summary for _ in range(2))
     assert a == b
     assert a["seed"] == 5
     assert a["scenario"]["trajectory"]["waypoints"] != list(map(list, load(SCENARIO).trajectory.waypoints))
 
 
-def test_one_chain_may_be_asked_for(out, capsys):
-    assert main(["table1", "--out", str(out), "--chain", "paper"]) == 0
-    assert "idbench X" not in capsys.readouterr().out
-    summary = json.loads((out / "summary.json").read_text())
+def test_one_chain_may_be_asked_for(ran):
+    printed, _, summary = ran("table1 --out kept --chain paper")
+    assert "idbench X" not in printed
     assert summary["chain"] == "paper"
     assert summary["models"]["explicit"]["relative_error_percent"][0] > 0.01
     assert "idbench_chain" not in summary
@@ -60,15 +57,13 @@ def test_results_go_through_a_link(tmp_path, capsys):
 
 
 @pytest.mark.thorough
-def test_search_writes_a_scenario(tmp_path, capsys):
-    path = tmp_path / "found.toml"
-    assert main(["search", "--seed", "5", "--out", str(path)]) == 0
-    found = load(str(path))
+def test_search_writes_a_scenario(tmp_path, ran):
+    ran("search --seed 5 --out found.toml")
+    found = load(str(tmp_path / "found.toml"))
     assert found.seed == 5
-    assert main(["table1", "--scenario", str(path), "--chain", "idbench", "--out", str(tmp_path / "out")]) == 0
-    assert from_dict(json.loads((tmp_path / "out" / "summary.json").read_text())["scenario"]) == found
-    assert main(["search", "--seed", "5"]) == 0
-    assert path.read_text() in capsys.readouterr().out
+    summary = ran("table1 --scenario found.toml --chain idbench --out kept").summary
+    assert from_dict(summary["scenario"]) == found
+    assert (tmp_path / "found.toml").read_text() in ran("search --seed 5").out
 
 
 def test_list_shows_every_plugin_with_a_line(capsys):
@@ -91,12 +86,9 @@ def test_a_reader_that_goes_away_is_no_error(tmp_path, start):
     assert process.wait() == 0
 
 
-def test_the_last_word_is_that_without_a_name_where_one_is_needed(capsys):
+def test_the_last_word_is_that_without_a_name_where_one_is_needed(ran):
     """Options of several words take all that follows; a switch may stand twice."""
-    assert main(["robot", "--add", "offset", "two_link"]) == 0
-    after = capsys.readouterr().out
-    assert main(["robot", "two_link", "--add", "offset"]) == 0
-    assert capsys.readouterr().out == after
+    assert ran("robot --add offset two_link").out == ran("robot two_link --add offset").out
     assert main(["list", "--json", "--json"]) == 2
     assert main(["run", "ideal", "-v", "-v", "--no-rerun", "--index", "0"]) == 2  # --index needs --from: words are read
 

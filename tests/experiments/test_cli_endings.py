@@ -58,6 +58,16 @@ def test_interruption_of_the_work_leaves_nothing(out, capfd, monkeypatch):
     assert not list(out.parent.iterdir())
 
 
+def interrupted(process, line, later=0.0):
+    """Interrupt a process some time [s] after it has printed a line; return its errors."""
+    assert any(printed == f"{line}\n" for printed in process.stdout)
+    time.sleep(later)
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate()
+    assert process.returncode == 130, err
+    return err
+
+
 def test_a_real_interrupt_ends_the_process_without_a_traceback(tmp_path, start):
     """Ctrl-C at some instant of a long search."""
     code = "import sys; from idbench.experiments.paper.job import TrajectorySearch; from idbench.experiments import cli\n"
@@ -66,13 +76,7 @@ def test_a_real_interrupt_ends_the_process_without_a_traceback(tmp_path, start):
         "paper.TrajectorySearch = lambda seed: print('searching') or TrajectorySearch(seed=seed, tolerance=0.0, rounds=10**6)\n"
     )
     code += "sys.exit(cli.main(['table1', '--seed', '1', '--out', 'results']))"
-    process = start("-uc", code, cwd=tmp_path)
-    assert process.stdout.readline()  # the search is under way
-    time.sleep(0.2)
-    process.send_signal(signal.SIGINT)
-    _, err = process.communicate()
-    assert process.returncode == 130, err
-    assert err.strip() == "idbench: interrupted"
+    assert interrupted(start("-uc", code, cwd=tmp_path), "searching", 0.2) == "idbench: interrupted\n"
     assert not list(tmp_path.iterdir())
 
 
@@ -83,7 +87,7 @@ def test_an_interrupt_that_python_ignores_comes_again(capfd):
         def __del__(self):
             signal.raise_signal(signal.SIGINT)
 
-    def interrupted():
+    def losing_one():
         with noticing():
             lock = Lock()
             del lock
@@ -92,7 +96,7 @@ def test_an_interrupt_that_python_ignores_comes_again(capfd):
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         with pytest.raises(KeyboardInterrupt):
-            interrupted()
+            losing_one()
     finally:
         signal.signal(signal.SIGINT, before)
     assert capfd.readouterr().err == ""
@@ -113,11 +117,7 @@ def test_an_interrupt_that_comes_out_as_another_error_is_one(tmp_path, start):
         paper.TrajectorySearch = half_loaded
         sys.exit(cli.main(["table1", "--seed", "1", "--out", "results"]))
     """
-    process = start("-uc", code, cwd=tmp_path)
-    assert process.stdout.readline()
-    process.send_signal(signal.SIGINT)
-    _, err = process.communicate()
-    assert (process.returncode, err.strip()) == (130, "idbench: interrupted")
+    assert interrupted(start("-uc", code, cwd=tmp_path), "searching") == "idbench: interrupted\n"
 
 
 @pytest.mark.thorough
@@ -134,12 +134,8 @@ def test_an_interrupt_while_a_module_is_loaded_is_as_quiet(tmp_path, module, sta
         from idbench.experiments.cli import main
         sys.exit(main(["table1", "--out", "x"]))
     """
-    process = start("-c", code, cwd=tmp_path)
-    assert any(line == "loading\n" for line in process.stdout)
-    process.send_signal(signal.SIGINT)
-    _, err = process.communicate()
     kept = "\nidbench: what was found is printed, and in x\n" if module == "rerun" else ""
-    assert (process.returncode, err) == (130, f"{kept}idbench: interrupted\n")
+    assert interrupted(start("-c", code, cwd=tmp_path), "loading") == f"{kept}idbench: interrupted\n"
     assert [listed(path) for path in tmp_path.iterdir()] == ([KEPT] if module == "rerun" else [])
 
 

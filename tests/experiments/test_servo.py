@@ -16,10 +16,7 @@ import numpy as np
 import pytest
 
 from idbench.experiments.cli import main
-from idbench.experiments.cli.options.jobs import IdentifyServo
-from idbench.experiments.errors import ExperimentError
 from idbench.experiments.recording.folder import known
-from idbench.experiments.servo.job import held_of
 from idbench.identify.files.servo_file import ServoFile
 from idbench.identify.servo import JointLoad, ServoRun
 from idbench.identify.servo.closed_loop import ServoLoop
@@ -344,18 +341,3 @@ def test_the_robot_of_a_log_has_the_same_joints(bench, idbench, tmp_path, robot,
     code, _, err = idbench("servo", bench / "fit.csv", "--robot", bench / "pendulum.xml", "--servo", tmp_path / "servo.toml")
     assert code != 0
     assert said in err
-
-
-def test_a_joint_has_what_is_held_for_it_before_what_is_held_for_all():
-    held = held_of(IdentifyServo(hold=("wrist.roll.a=0.7", "a=0.5", "Ia=0.02")), ["elbow", "wrist.roll"])
-    assert held == {"elbow": {"a": 0.5, "Ia": 0.02}, "wrist.roll": {"a": 0.7, "Ia": 0.02}}
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [("elbow.kt=0.5", "no parameter 'kt'"), ("wrist.a=0.5", "no such joint; joints are elbow")],
-    ids=["letter", "joint"],
-)
-def test_unknown_names_are_refused(text, message):
-    with pytest.raises(ExperimentError, match=message):
-        held_of(IdentifyServo(hold=(text,)), ["elbow"])
