@@ -107,36 +107,24 @@ def test_a_table_is_a_mapping():
     assert ESTIMATORS.get("nothing") is None
 
 
-def test_a_plugin_that_cannot_be_loaded_is_named(tmp_path, monkeypatch):
-    install(tmp_path, "broken", "raise RuntimeError('no licence')\n", "[idbench.estimators]\nbroken = broken:Nothing\n")
+@pytest.mark.parametrize(
+    ("source", "said"),
+    [
+        ("raise RuntimeError('no licence')\n", r"'own' \(other:Own\) cannot be loaded: RuntimeError: no licence"),
+        ("class Own: pass\n", "'own' makes Own, not AbstractEstimator"),
+        ("class Own:\n    def __init__(self, x): pass\n", "'own' cannot be made without arguments"),
+    ],
+    ids=["not loaded", "another kind", "not made"],
+)
+def test_a_plugin_that_is_not_what_it_promises_is_named_and_listed_with_its_reason(tmp_path, monkeypatch, source, said):
+    install(tmp_path, "other", source, "[idbench.estimators]\nown = other:Own\n")
     monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, "other", raising=False)
     table = PluginTable("estimators", AbstractEstimator, {})
-    assert list(table) == ["broken"]
-    with pytest.raises(PluginError, match=r"'broken' \(broken:Nothing\) cannot be loaded: RuntimeError: no licence"):
-        table.create("broken")
-
-
-def test_a_plugin_of_another_kind_is_refused(tmp_path, monkeypatch):
-    install(tmp_path, "other", "class Thing: pass\n", "[idbench.estimators]\nthing = other:Thing\n")
-    monkeypatch.syspath_prepend(tmp_path)
-    with pytest.raises(PluginError, match="'thing' makes Thing, not AbstractEstimator"):
-        PluginTable("estimators", AbstractEstimator, {}).create("thing")
-
-
-def test_a_plugin_that_cannot_be_made_is_told_and_listed_with_its_reason(tmp_path, monkeypatch):
-    install(tmp_path, "needy", "class Needy:\n    def __init__(self, x): pass\n", "[idbench.estimators]\nneedy = needy:Needy\n")
-    monkeypatch.syspath_prepend(tmp_path)
-    table = PluginTable("estimators", AbstractEstimator, {})
-    with pytest.raises(PluginError, match="'needy' cannot be made without arguments"):
-        table.create("needy")
-    assert "cannot be made" in table.summary("needy")
-
-
-def test_what_is_built_in_cannot_be_replaced(tmp_path, monkeypatch):
-    install(tmp_path, "thief", "class Thief: pass\n", "[idbench.estimators]\nOLS = thief:Thief\n")
-    monkeypatch.syspath_prepend(tmp_path)
-    builtin = dict.fromkeys(["OLS"], ESTIMATORS["OLS"])
-    assert PluginTable("estimators", AbstractEstimator, builtin).create("OLS") == ESTIMATORS.create("OLS")
+    assert list(table) == ["own"]
+    with pytest.raises(PluginError, match=said):
+        table.create("own")
+    assert "cannot be made" in table.summary("own") or "__init__" not in source
 
 
 def test_names_that_are_taken_are_told(tmp_path, monkeypatch):

@@ -141,7 +141,7 @@ def commands(folder: Path) -> None:
 
 def growth(folder: Path) -> None:
     """Print time and memory over joints and samples, with the exponents between neighbours."""
-    joints, samples = (6, 15, 30), (20_000, 80_000, 240_000, 1_000_000)
+    joints, samples = (6, 15, 30), (20_000, 80_000, 240_000, 1_000_000, 3_600_000)
     one, all_ = {"samples": 10_000, "models": ["explicit"]}, {"n": 6, "models": ["explicit", "implicit", "power"]}
     series = {
         f"{what}, {estimator}": (key, values, {**fixed, "estimator": estimator})

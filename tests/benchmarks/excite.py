@@ -10,11 +10,11 @@ far the worst of the seeds is from the best.
 import statistics
 import sys
 import time
-from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
 import numpy as np
+from timing import seconds
 
 from idbench.experiments.excite.design import Design
 from idbench.experiments.excite.excited import Excited
@@ -24,13 +24,6 @@ from idbench.sim.scenario.scenario_file import load
 
 TIMES = 20
 """Repetitions of short work."""
-
-
-def timed(work: Callable[[], object]) -> float:
-    """Return how long something takes [s]."""
-    start = time.perf_counter()
-    work()
-    return time.perf_counter() - start
 
 
 def designed(robot: str, seed: int) -> tuple[Excited, float]:
@@ -47,8 +40,8 @@ def main(seeds: int, robots: tuple[str, ...] = ("scara", "puma560", "panda")) ->
     for robot in robots:
         each = [designed(robot, seed) for seed in range(seeds)]
         found, plan = each[0][0], each[0][0].design.plan
-        value = statistics.median(timed(partial(plan.value, found.c)) for _ in range(TIMES))
-        columns = statistics.median(timed(partial(plan.information.columns, plan.motion(found.c))) for _ in range(TIMES))
+        value = statistics.median(seconds(partial(plan.value, found.c)) for _ in range(TIMES))
+        columns = statistics.median(seconds(partial(plan.information.columns, plan.motion(found.c))) for _ in range(TIMES))
         typical = [float(np.log(one.sigma).mean()) for one, _ in each]
         median, best = (max(one.ratios[i] for one, _ in each) for i in (0, 1))
         print(

@@ -8,12 +8,12 @@ import runpy
 import subprocess
 import tempfile
 import time
-from importlib.metadata import files
 from math import nan
 from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
+from timing import ur5
 
 from idbench.experiments.exports.c_code import OF_INTERVAL, c_texts
 from idbench.experiments.exports.code import Content
@@ -90,8 +90,7 @@ def in_python(content, folder):
 
 def pinocchios():
     """Return the time of pinocchio's rnea of a UR5, called from Python [us]."""
-    (path,) = [f.locate() for f in files("example-robot-data") or () if str(f).endswith("urdf/ur5_robot.urdf")]
-    model = pin.buildModelFromUrdf(str(path))
+    model = ur5()
     data, motion = model.createData(), np.random.default_rng(0).normal(size=(3, 6))
     return best(lambda: [pin.rnea(model, data, *motion) for _ in range(20_000)], 20_000)
 

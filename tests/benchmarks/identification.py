@@ -1,18 +1,30 @@
-"""All three models from one log, against pinocchio computing the explicit regressor alone.
+"""All three models from one log, and explicit columns of six joints, against pinocchio computing the regressor alone.
 
     uv run --group benchmark python tests/benchmarks/identification.py
 
-Both work on the same 4000 samples of 2 joints; runs are interleaved, so that the ratio holds when the machine's speed drifts.
+Both work on the same 4000 samples; runs are interleaved, so that the ratio holds when the machine's speed drifts.
 """
-
-import time
-from collections.abc import Callable
 
 import numpy as np
 import pinocchio as pin
+from timing import seconds, ur5
 
 from idbench.experiments.paper.table1 import SCENARIO, Table1
-from idbench.identify import CHAINS, ESTIMATORS, MODELS, Chain, MotionLog, identify_each, scara
+from idbench.identify import (
+    CHAINS,
+    ESTIMATORS,
+    MODELS,
+    BaseParameters,
+    Chain,
+    Joint,
+    KinematicTree,
+    MotionLog,
+    State,
+    TreeLinks,
+    identify_each,
+    scara,
+    tree_basis,
+)
 from idbench.sim.scenario.scenario_file import load
 
 SAMPLES, RUNS = 4000, 60
@@ -25,13 +37,6 @@ def planar_arm() -> pin.Model:
     elbow = model.addJoint(0, pin.JointModelRZ(), pin.SE3.Identity(), "joint1")
     model.addJoint(elbow, pin.JointModelRZ(), placement, "joint2")
     return model
-
-
-def seconds(function: Callable[[], object]) -> float:
-    """Return how long one call takes."""
-    start = time.perf_counter()
-    function()
-    return time.perf_counter() - start
 
 
 def main() -> None:
@@ -65,5 +70,31 @@ def main() -> None:
             print(f"{what}, pinocchio's regressor {1e3 * theirs:6.2f} ms, ratio {ratio:.2f}")
 
 
+def six_joints() -> None:
+    """Print the time of the explicit columns of a UR5 against pinocchio's in a loop."""
+    model = ur5()
+    data, places = model.createData(), model.jointPlacements
+    axes = [np.ravel(model.joints[i].createData().S[3:]) for i in range(1, model.njoints)]
+    joints = [
+        Joint(model.names[i], "hinge", model.parents[i] - 1, places[i].translation, places[i].rotation, axes[i - 1], [0, 0, 0])
+        for i in range(1, model.njoints)
+    ]
+    tree = KinematicTree("ur5", tuple(joints), model.gravity.linear)
+    q, qd, qdd = np.random.default_rng(0).uniform(-2, 2, (3, tree.n, SAMPLES))
+
+    def theirs() -> None:
+        for k in range(SAMPLES):
+            pin.computeJointTorqueRegressor(model, data, q[:, k], qd[:, k], qdd[:, k])
+
+    blocks = {"60 standard": TreeLinks(tree), "52 base": BaseParameters.of(tree, tree_basis(tree)).basis}
+    for name, block in blocks.items():
+        columns = block.explicit
+        pairs = [(seconds(lambda c=columns: c(State(q, qd, lambda _: qdd))), seconds(theirs)) for _ in range(7)]
+        mine, loop = np.min(pairs, axis=0)
+        what = f"explicit columns, 6 joints, {SAMPLES} samples, {name} parameters: {1e3 * mine:.1f} ms"
+        print(f"{what}, pinocchio's regressor {1e3 * loop:.1f} ms, ratio {mine / loop:.2f}")
+
+
 if __name__ == "__main__":
+    six_joints()
     main()

@@ -9,12 +9,12 @@ is printed, of the simulation and of the whole: simulate, identify, record, writ
 import statistics
 import tempfile
 import time
-from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
 import rerun as rr
+from timing import seconds as timed
 
 from idbench.experiments.identification.request import Request
 from idbench.experiments.identification.scenario_run import ScenarioRun
@@ -32,13 +32,6 @@ from idbench.sim.scenario.scenario_file import from_dict, load
 
 TIMES = 7
 """Repetitions."""
-
-
-def timed(work: Callable[[], object]) -> float:
-    """Return how long something takes [s]."""
-    start = time.perf_counter()
-    work()
-    return time.perf_counter() - start
 
 
 def forty_seconds(folder: Path) -> None:

@@ -11,11 +11,9 @@ import resource
 import sys
 import tempfile
 import time
-from copy import copy
 from pathlib import Path
 
-import mujoco
-from mujoco.batch import Batch
+from timing import bare
 
 from idbench.experiments.recording.study_recording import StudyRecording
 from idbench.experiments.results.folder import ResultsFolder
@@ -41,24 +39,17 @@ def study(runs: int) -> Study:
     return study_from({**content, "settings": settings}, "study")
 
 
-def bare(described: Study, runs: int) -> float:
+def native(described: Study, runs: int) -> float:
     """Return how long bare steps of as many simulations take [s]."""
     scenario = described.scenario_of(0)
-    model = copy(scenario.real_robot.model)
-    model.opt.timestep, model.opt.integrator = 0.001, mujoco.mjtIntegrator.mjINT_RK4
-    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
     steps = round(scenario.trajectory.plan(scenario.nominal_robot).duration / 0.001)
-    batch = Batch(model, runs, THREADS)
-    batch.bind("qfrc_applied")[:] = [3.0, 0.3]
-    start = time.perf_counter()
-    batch.step(nstep=steps)
-    return time.perf_counter() - start
+    return bare(scenario, 0.001, steps, runs, THREADS)
 
 
 def timed(runs: int, workers: int, report: bool) -> tuple[float, float]:
     """Return how long a study takes, and bare steps before and after it [s]."""
     described = study(runs)
-    before = bare(described, runs // 2)
+    before = native(described, runs // 2)
     with tempfile.TemporaryDirectory() as folder:
         start = time.perf_counter()
         store = Store.new(described, Path(folder) / "out")
@@ -73,7 +64,7 @@ def timed(runs: int, workers: int, report: bool) -> tuple[float, float]:
         seconds = store.seconds()
         print(f"  start {up:.1f} s, not in the ratio below")
         print(f"  {', '.join(f'{what} {s:.1f} s' for what, s in seconds.items())} of the threads' time")
-    return took, before + bare(described, runs - runs // 2)
+    return took, before + native(described, runs - runs // 2)
 
 
 def main() -> None:
@@ -81,9 +72,9 @@ def main() -> None:
     for runs, workers in ((RUNS, 0), (RUNS if RUNS < 256 else 256, 2)):
         where = f"{workers} worker processes" if workers else f"{THREADS} threads"
         print(f"{runs} runs on {where}:")
-        took, native = timed(runs, workers, not workers)
+        took, steps = timed(runs, workers, not workers)
         memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-        print(f"  {took:.1f} s, bare steps {native:.1f} s, ratio {took / native:.3f}; peak memory {memory:.0f} MB")
+        print(f"  {took:.1f} s, bare steps {steps:.1f} s, ratio {took / steps:.3f}; peak memory {memory:.0f} MB")
 
 
 if __name__ == "__main__":

@@ -3,21 +3,17 @@
     uv run python tests/benchmarks/throughput.py
 
 64 simulations with 16-bit encoders and a PD loop at 100 Hz; runs are interleaved, so that ratios hold when the machine's
-speed drifts. The bare simulations are pushed by constant torques, so that they move as well.
+speed drifts.
 """
 
-import time
-from copy import copy
 from dataclasses import replace
 
-import mujoco
 import numpy as np
-from mujoco.batch import Batch
+from timing import bare, seconds
 
 from idbench.sim.drives import AbstractDrive, AveragedDrive, IdealDrive, SwitchedDrive
 from idbench.sim.encoders import IncrementalEncoder
 from idbench.sim.engine.simulation import simulate
-from idbench.sim.scenario.scenario import Scenario
 from idbench.sim.scenario.scenario_file import load
 from idbench.sim.trajectories import RandomMoves
 
@@ -31,18 +27,6 @@ DRIVES: dict[str, AbstractDrive] = {
 }
 
 
-def bare(scenario: Scenario, h: float, steps: int) -> float:
-    """Return how long bare steps of all simulations take [s]."""
-    model = copy(scenario.real_robot.model)
-    model.opt.timestep, model.opt.integrator = h, mujoco.mjtIntegrator.mjINT_RK4
-    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
-    batch = Batch(model, NSIM)
-    batch.bind("qfrc_applied")[:] = [3.0, 0.3]
-    start = time.perf_counter()
-    batch.step(nstep=steps)
-    return time.perf_counter() - start
-
-
 def main() -> None:
     """Print steps per second and the ratio to bare steps for each drive."""
     for name, drive in DRIVES.items():
@@ -51,10 +35,8 @@ def main() -> None:
         steps = round(MOVES.plan(scenario.nominal_robot).duration / h)
         pairs = []
         for _ in range(RUNS):
-            native = bare(scenario, h, steps)
-            start = time.perf_counter()
-            simulate(scenario, range(NSIM))
-            pairs.append((native, time.perf_counter() - start))
+            native = bare(scenario, h, steps, NSIM)
+            pairs.append((native, seconds(lambda scenario=scenario: simulate(scenario, range(NSIM)))))
         native, ours = np.median(pairs, axis=0)
         ratio = np.median([n / o for n, o in pairs])
         print(f"{name:20} {NSIM * steps / ours:9.0f} steps/s, bare {NSIM * steps / native:9.0f}, ratio {ratio:.2f}")

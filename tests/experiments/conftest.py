@@ -1,6 +1,9 @@
 """What the tests of the command line share."""
 
+import json
 from dataclasses import replace
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -42,6 +45,28 @@ def idbench(capsys, monkeypatch, tmp_path):
         code = main([str(word) for word in words])
         out, err = capsys.readouterr()
         return code, out, err
+
+    return run
+
+
+class Ran(NamedTuple):
+    """What a command printed, and the summary in its --out."""
+
+    out: str
+    err: str
+    summary: dict[str, Any] | None
+
+
+@pytest.fixture
+def ran(idbench):
+    """Run a command that succeeds in an empty folder, its words in texts and paths."""
+
+    def run(*words):
+        words = [part for word in words for part in (word.split() if isinstance(word, str) else [word])]
+        code, out, err = idbench(*words)
+        assert code == 0, err
+        path = Path(words[words.index("--out") + 1], "summary.json") if "--out" in words else Path("none")
+        return Ran(out, err, json.loads(path.read_text()) if path.exists() else None)
 
     return run
 

@@ -19,8 +19,6 @@ from idbench.sim.scenario.scenario_file import load
 
 pytestmark = pytest.mark.thorough
 
-ARMS = "puma560", "panda"
-
 
 def scenario(robot, moves, seed):
     """Averaged drives, 17-bit encoders, gravity, friction, half a millisecond of computing time, at 500 Hz."""

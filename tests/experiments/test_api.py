@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 import idbench
-from idbench.experiments.cli import main
 from idbench.identify import ESTIMATORS, AbstractEstimator, AbstractFriction, Estimate, WeightedLeastSquares
 from idbench.identify.files.log_file import write_log
 from idbench.sim.trajectories import RandomMoves
@@ -32,12 +31,8 @@ NAMES = {"experiment", "log", "path", "folder", "warnings", "command", "version"
 """What a summary has beside the result: names of files and what was printed."""
 
 
-def summary(folder):
-    found = json.loads((folder / "summary.json").read_text())
-    return {key: value for key, value in found.items() if key not in NAMES}
-
-
 def as_json(made):
+    """Return a summary as it is written, but for names of files and what was printed."""
     return {key: value for key, value in json.loads(json.dumps(made)).items() if key not in NAMES}
 
 
@@ -53,13 +48,12 @@ def files(tmp_path_factory):
     return folder
 
 
-def test_a_fit_of_files_is_that_of_the_command(files, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    words = ["--validate", str(files / "second.parquet"), "--model", "explicit", "--estimator", "WLS", "--no-rerun"]
-    assert main(["identify", str(files / "first.parquet"), *words, "--out", "found"]) == 0
+def test_a_fit_of_files_is_that_of_the_command(files, ran):
+    words = "--model explicit --estimator WLS --no-rerun --out found --validate"
+    out, _, summary = ran("identify", files / "first.parquet", words, files / "second.parquet")
     fit = idbench.fit(files / "first.parquet", validate=files / "second.parquet", model="explicit", estimator="WLS")
-    assert as_json(fit.summary()) == summary(tmp_path / "found")
-    assert fit.verdict.split("; next: ") == [line.removeprefix("next: ") for line in capsys.readouterr().out.splitlines()[:2]]
+    assert as_json(fit.summary()) == as_json(summary)
+    assert fit.verdict.split("; next: ") == [line.removeprefix("next: ") for line in out.splitlines()[:2]]
 
 
 def test_a_fit_of_logs_is_that_of_their_files(files):
@@ -72,62 +66,51 @@ def test_a_fit_of_logs_is_that_of_their_files(files):
     ]
 
 
-def test_a_run_is_that_of_the_command(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    assert main(["run", "ideal", "--out", "ran", "--no-rerun", "--estimator", "OLS"]) == 0
+def test_a_run_is_that_of_the_command(ran):
+    written = ran("run ideal --out kept --no-rerun --estimator OLS").summary
     run = idbench.simulate("ideal")
-    assert run.truth == dict(zip(*(summary(tmp_path / "ran")[key] for key in ("parameters", "truth")), strict=True))
+    assert run.truth == dict(zip(written["parameters"], written["truth"], strict=True))
     fit = idbench.fit(run.log, run.robot, truth=run.truth, estimator="OLS")
-    written = summary(tmp_path / "ran")
     assert as_json(fit.fit.summary())["models"] == written["models"]
 
 
-def test_a_study_is_that_of_the_command(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def test_a_study_is_that_of_the_command(tmp_path, ran):
     text = (
         'name = "short"\nquestion = "?"\nscenario = "quantization"\nseeds = 2\nmodels = ["explicit"]\nestimators = ["OLS"]\n'
         '[settings.trajectory]\nkind = "random"\nmoves = 6\n[[axes]]\nfield = "encoder.lines"\nvalues = [1024, 4096]\n'
     )
     (tmp_path / "short.toml").write_text(text)
-    assert main(["study", "short.toml", "--no-rerun"]) == 0
-    table, seconds = idbench.study("short.toml"), {"seconds"}
-    written = summary(tmp_path / "runs" / "short")
-    made = as_json(table.summary())
-    assert {k: v for k, v in made.items() if k not in seconds} == {k: v for k, v in written.items() if k not in seconds}
+    written, table = ran("study short.toml --no-rerun --out kept").summary, idbench.study("short.toml")
+    assert as_json(table.summary() | {"seconds": 0}) == as_json(written | {"seconds": 0})
     assert "1024" in repr(table)
     own = idbench.study("short.toml", estimators=["WLS", Ridge(), Ridge(1e-3)])
     assert {names[1] for _, *names in own.typical_errors()} == {"WLS", "Ridge", "Ridge(0.001)"}
 
 
 @pytest.mark.thorough
-def test_tables_and_motions_are_those_of_their_commands(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    assert main(["table1", "--no-rerun", "--out", "t1"]) == 0
-    assert as_json(idbench.table1().summary()) == summary(tmp_path / "t1")
-    words = ["--duration", "4", "--seed", "2"]
-    assert main(["excite", "scara", *words, "--no-rerun", "--out", "moved"]) == 0
-    assert as_json(idbench.design("scara", duration=4, seed=2).summary()) == summary(tmp_path / "moved")
+def test_tables_and_motions_are_those_of_their_commands(ran):
+    assert as_json(idbench.table1().summary()) == as_json(ran("table1 --no-rerun --out t1").summary)
+    written = ran("excite scara --duration 4 --seed 2 --no-rerun --out moved").summary
+    assert as_json(idbench.design("scara", duration=4, seed=2).summary()) == as_json(written)
 
 
 @pytest.mark.thorough
-def test_payloads_gains_and_servos_are_those_of_their_commands(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def test_payloads_gains_and_servos_are_those_of_their_commands(tmp_path, ran):
     loaded = idbench.load_scenario("payload")
     for name, scenario in (("with", loaded), ("without", replace(loaded, payload=type(loaded.payload)()))):
         write_log(idbench.simulate(scenario).log, tmp_path / f"{name}.parquet")
-    words = ["with.parquet", "--unloaded", "without.parquet", "--robot", loaded.robot]
+    words = f"with.parquet --unloaded without.parquet --robot {loaded.robot}"
     keys = {"unloaded": "without.parquet", "robot": loaded.robot}
-    assert main(["payload", *words, "--out", "payload"]) == 0
-    assert as_json(idbench.fit_payload("with.parquet", **keys).summary()) == summary(tmp_path / "payload")
-    assert main(["gains", *words, "--mass", f"{loaded.payload.mass}", "--out", "gains"]) == 0
+    written = ran("payload", words, "--out payload").summary
+    assert as_json(idbench.fit_payload("with.parquet", **keys).summary()) == as_json(written)
+    written = ran("gains", words, f"--mass {loaded.payload.mass} --out gains").summary
     made = idbench.fit_gains("with.parquet", **keys, mass=loaded.payload.mass)
-    assert as_json(made.summary()) == summary(tmp_path / "gains")
-    assert main(["run", "servo", "--no-rerun", "--out", "ran"]) == 0
+    assert as_json(made.summary()) == as_json(written)
+    ran("run servo --no-rerun --out ran")
     robot = idbench.load_scenario("servo").robot
-    words = ["ran/log.parquet", "--robot", robot, "--servo", "ran/servo.toml", "--no-rerun", "--out", "servo"]
-    assert main(["servo", *words]) == 0
-    written = {key: x for key, x in summary(tmp_path / "servo").items() if key not in ("robot", "friction")}
-    assert as_json(idbench.fit_servos("ran/log.parquet", robot, "ran/servo.toml").summary()) == written
+    written = ran(f"servo ran/log.parquet --robot {robot} --servo ran/servo.toml --no-rerun --out servo").summary
+    made = as_json(idbench.fit_servos("ran/log.parquet", robot, "ran/servo.toml").summary())
+    assert made == {key: x for key, x in as_json(written).items() if key not in ("robot", "friction")}
 
 
 def test_numbers_have_units_and_errors_and_torques_are_predicted(files, robot):

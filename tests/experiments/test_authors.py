@@ -42,14 +42,11 @@ def test_its_own_test_passes(here):
 
 
 @pytest.mark.thorough
-def test_a_scenario_and_a_study_are_begun_that_run(here, capsys):
-    assert main(["new", "scenario", "mine", "--like", "quantization"]) == 0
-    assert main(["run", "mine.toml", "--no-rerun"]) == 0
-    assert main(["new", "study", "asked"]) == 0
-    assert main(["study", "asked.toml", "--seeds", "2", "--no-rerun"]) == 0
-    printed = capsys.readouterr().out
-    assert "Scenario mine" in printed
-    assert "How much noise of the torque can asked bear?" in printed
+def test_a_scenario_and_a_study_are_begun_that_run(ran):
+    ran("new scenario mine --like quantization")
+    assert "Scenario mine" in ran("run mine.toml --no-rerun").out
+    ran("new study asked")
+    assert "How much noise of the torque can asked bear?" in ran("study asked.toml --seeds 2 --no-rerun").out
 
 
 BROKEN = '''
@@ -88,14 +85,12 @@ def test_alone_it_says_what_there_is_to_do_in_ten_lines(capsys):
 
 
 @pytest.mark.thorough
-def test_an_example_is_an_arm_with_two_logs_that_agree(here, capsys):
+def test_an_example_is_an_arm_with_two_logs_that_agree(here, idbench, ran):
     """As README types it: one is fitted, the other validates; a folder that is there stays as it is."""
-    assert main(["new", "example", "mine"]) == 0
-    assert "idbench identify mine/log.csv --robot mine/arm.xml" in capsys.readouterr().out
+    assert "idbench identify mine/log.csv --robot mine/arm.xml" in ran("new example mine").out
     assert sorted(path.name for path in (here / "mine").iterdir()) == ["arm.xml", "log.csv", "second.csv", "truth.csv"]
-    words = ["--robot", "mine/arm.xml", "--torque", "held", "--torque-delay", "estimate", "--validate", "mine/second.csv"]
-    assert main(["identify", "mine/log.csv", *words]) == 0
-    first, *lines = capsys.readouterr().out.splitlines()
+    words = "--robot mine/arm.xml --torque held --torque-delay estimate --validate mine/second.csv"
+    first, *lines = ran("identify mine/log.csv", words).out.splitlines()
     assert first.startswith("Result: good (explicit model)")
     with (here / "mine" / "truth.csv").open() as file:
         truth = {row["parameter"]: float(row["value"]) for row in csv.DictReader(file)}
@@ -105,5 +100,5 @@ def test_an_example_is_an_arm_with_two_logs_that_agree(here, capsys):
         value, error = text.rstrip(")").split("(")
         sigma = int(error) * 10.0 ** -len(value.partition(".")[2])
         assert abs(float(value) - truth[name]) < 4 * sigma, name
-    assert main(["new", "example", "mine"]) == 2
-    assert "mine exists" in capsys.readouterr().err
+    code, _, err = idbench("new", "example", "mine")
+    assert (code, "mine exists" in err) == (2, True)

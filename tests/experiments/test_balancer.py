@@ -1,7 +1,5 @@
 """`--balancer`: a spring between two points, against MuJoCo's spatial tendon."""
 
-import json
-
 import mujoco
 import numpy as np
 import pytest
@@ -49,32 +47,13 @@ def written(folder, seed):
     return str(path)
 
 
-def identified(folder, *options):
-    (folder / "arm.xml").write_text(ARM.format(anchor="", eye="", tendon=""))
-    logs = [written(folder, 0), "--validate", written(folder, 1)]
-    asked = ["--robot", str(folder / "arm.xml"), "--torque", "instantaneous", "--torque-delay", "0", "--friction", "viscous"]
-    words = [
-        "identify",
-        *logs,
-        *asked,
-        "--model",
-        "explicit",
-        "--no-rerun",
-        "--json",
-        "--force",
-        "--out",
-        str(folder / "found"),
-    ]
-    assert main([*words, *options]) == 0
-
-
 @pytest.mark.thorough
-def test_the_spring_of_mujoco_is_found(tmp_path, capsys):
+def test_the_spring_of_mujoco_is_found(tmp_path, ran):
     """Its F0 = k (|a - b| - length) and Kb = k are grouped: F0 - |a - b| Kb is minus k times the length."""
-    found = []
-    for options in ((), ("--balancer", OPTION)):
-        identified(tmp_path, *options)
-        found.append(json.loads(capsys.readouterr().out))
+    (tmp_path / "arm.xml").write_text(ARM.format(anchor="", eye="", tendon=""))
+    words = f"identify {written(tmp_path, 0)} --validate {written(tmp_path, 1)} --robot arm.xml --torque instantaneous"
+    words += " --torque-delay 0 --friction viscous --model explicit --no-rerun --force --out found"
+    found = [ran(words, options).summary for options in ("", f"--balancer {OPTION}")]
     (X, sigma), (plain, sprung) = (
         [found[1]["models"]["explicit"][x] for x in ("estimate", "sigma")],
         [each["validation"]["models"]["explicit"] for each in found],

@@ -4,12 +4,16 @@ import json
 import re
 import subprocess
 
+import numpy as np
 import pytest
 
 from idbench.experiments.cli import main
 from idbench.experiments.cli.app import COMMANDS
 from idbench.experiments.paper.table1 import SCENARIO
+from idbench.experiments.plugin_tables import TABLES
+from idbench.experiments.requests.shared import CHAIN, ESTIMATOR
 from idbench.experiments.results.writing import NAME as MANIFEST
+from idbench.identify import CHAINS, ESTIMATORS, MODELS, identify, scara
 from idbench.identify.files.log_file import read_log
 from idbench.sim.scenario.scenario_file import from_dict, load
 
@@ -17,20 +21,8 @@ from idbench.sim.scenario.scenario_file import from_dict, load
 def test_table1_prints_and_writes_everything(out, capsys):
     assert main(["table1", "--out", str(out)]) == 0
     printed = capsys.readouterr().out
-    for text in (
-        "explicit model",
-        "implicit model",
-        "power model",
-        "energy model",
-        "integral model",
-        "The paper's conclusion, with 95 % confidence intervals",
-        "0.649",
-        "3.502",
-        "Cond(W)",
-        "rows",
-        "all three",
-    ):
-        assert text in printed
+    assert all(f"{name} model" in printed for name in MODELS)
+    assert all(text in printed for text in ("The paper's conclusion, with 95 % confidence intervals", "0.649", "3.502"))
     recording = [f"recording.{name}-OLS.rrd" for name in ("idbench", "paper", "paper_masked")] + ["recording.rrd"]
     assert sorted({x.name for x in out.iterdir()} - {MANIFEST}) == ["log.parquet", *recording, "summary.json"]
     summary = json.loads((out / "summary.json").read_text())
@@ -42,19 +34,16 @@ def test_table1_prints_and_writes_everything(out, capsys):
 
 
 @pytest.mark.thorough
-def test_table1_repeats_itself(tmp_path, capsys):
-    for name in ("a", "b"):
-        main(["table1", "--out", str(tmp_path / name), "--seed", "5"])
-    a, b = (json.loads((tmp_path / name / "summary.json").read_text()) for name in ("a", "b"))
+def test_table1_repeats_itself(ran):
+    a, b = (ran("table1 --seed 5 --out kept").summary for _ in range(2))
     assert a == b
     assert a["seed"] == 5
     assert a["scenario"]["trajectory"]["waypoints"] != list(map(list, load(SCENARIO).trajectory.waypoints))
 
 
-def test_one_chain_may_be_asked_for(out, capsys):
-    assert main(["table1", "--out", str(out), "--chain", "paper"]) == 0
-    assert "idbench X" not in capsys.readouterr().out
-    summary = json.loads((out / "summary.json").read_text())
+def test_one_chain_may_be_asked_for(ran):
+    printed, _, summary = ran("table1 --out kept --chain paper")
+    assert "idbench X" not in printed
     assert summary["chain"] == "paper"
     assert summary["models"]["explicit"]["relative_error_percent"][0] > 0.01
     assert "idbench_chain" not in summary
@@ -68,32 +57,20 @@ def test_results_go_through_a_link(tmp_path, capsys):
 
 
 @pytest.mark.thorough
-def test_search_writes_a_scenario(tmp_path, capsys):
-    path = tmp_path / "found.toml"
-    assert main(["search", "--seed", "5", "--out", str(path)]) == 0
-    found = load(str(path))
+def test_search_writes_a_scenario(tmp_path, ran):
+    ran("search --seed 5 --out found.toml")
+    found = load(str(tmp_path / "found.toml"))
     assert found.seed == 5
-    assert main(["table1", "--scenario", str(path), "--chain", "idbench", "--out", str(tmp_path / "out")]) == 0
-    assert from_dict(json.loads((tmp_path / "out" / "summary.json").read_text())["scenario"]) == found
-    assert main(["search", "--seed", "5"]) == 0
-    assert path.read_text() in capsys.readouterr().out
+    summary = ran("table1 --scenario found.toml --chain idbench --out kept").summary
+    assert from_dict(summary["scenario"]) == found
+    assert (tmp_path / "found.toml").read_text() in ran("search --seed 5").out
 
 
 def test_list_shows_every_plugin_with_a_line(capsys):
     assert main(["list"]) == 0
     printed = capsys.readouterr().out
-    for name in (
-        "coulomb",
-        "explicit",
-        "butterworth",
-        "central",
-        "reversal",
-        "windows",
-        "modulating",
-        "idbench",
-        "OLS",
-    ):
-        assert name in printed
+    for table in TABLES:
+        assert all(re.search(rf"^ *{name} +\S", printed, re.MULTILINE) for name in table.builtin)
 
 
 def test_version(capsys):
@@ -109,12 +86,9 @@ def test_a_reader_that_goes_away_is_no_error(tmp_path, start):
     assert process.wait() == 0
 
 
-def test_the_last_word_is_that_without_a_name_where_one_is_needed(capsys):
+def test_the_last_word_is_that_without_a_name_where_one_is_needed(ran):
     """Options of several words take all that follows; a switch may stand twice."""
-    assert main(["robot", "--add", "offset", "two_link"]) == 0
-    after = capsys.readouterr().out
-    assert main(["robot", "two_link", "--add", "offset"]) == 0
-    assert capsys.readouterr().out == after
+    assert ran("robot --add offset two_link").out == ran("robot two_link --add offset").out
     assert main(["list", "--json", "--json"]) == 2
     assert main(["run", "ideal", "-v", "-v", "--no-rerun", "--index", "0"]) == 2  # --index needs --from: words are read
 
@@ -140,3 +114,10 @@ def test_bash_completes_what_is_typed(tmp_path, capsys):
     done"""
     done = subprocess.run(["bash", "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True)
     assert done.stdout.split() == ["1", "identify", "1", "--torque-delay", "1", "--armature", "1", "idbench.bash"]
+
+
+def test_the_command_lines_defaults_are_those_of_python(log):
+    """To the bit: another estimator, or another chain, gives other parameters."""
+    model = MODELS.create("explicit")
+    named = identify(log, scara(), model, CHAINS.create(CHAIN), ESTIMATORS.create(ESTIMATOR))
+    np.testing.assert_array_equal(identify(log, scara(), model).X, named.X)

@@ -21,25 +21,51 @@ def listed(folder):
     return sorted({path.name for path in folder.iterdir()} - {MANIFEST})
 
 
-def test_interruption_of_a_view_is_quiet_and_loses_no_result(out, capfd, monkeypatch):
-    def interrupted(*args):
-        raise KeyboardInterrupt
+FULL = OSError(28, "No space left on device")
 
-    monkeypatch.setattr(idbench.experiments.recording.comparison_recording, "record_table1", interrupted)
-    assert main(["table1", "--out", str(out)]) == 130
+
+def raising(error):
+    """Return a function that raises."""
+
+    def function(*args):
+        raise error
+
+    return function
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "said"),
+    [
+        (KeyboardInterrupt(), 130, ("idbench: what was found is printed, and in", "idbench: interrupted")),
+        (FULL, 2, ("idbench: the recording: No space left on device; what was found is printed, and in",)),
+    ],
+    ids=["interrupted", "full"],
+)
+def test_a_view_that_fails_or_is_interrupted_loses_no_result(out, capfd, monkeypatch, error, code, said):
+    monkeypatch.setattr(idbench.experiments.recording.comparison_recording, "record_table1", raising(error))
+    assert main(["table1", "--out", str(out)]) == code
     printed = capfd.readouterr()
-    assert "interrupted" in printed.err
+    lines = printed.err.strip().splitlines()
+    assert [line[: len(words)] for line, words in zip(lines, said, strict=True)] == list(said)
     assert "explicit model" in printed.out
     assert listed(out) == KEPT
+    assert list(out.parent.iterdir()) == [out]
 
 
 def test_interruption_of_the_work_leaves_nothing(out, capfd, monkeypatch):
-    def interrupted(*args):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("idbench.experiments.cli.commands.paper.print_table1", interrupted)
+    monkeypatch.setattr("idbench.experiments.cli.commands.paper.print_table1", raising(KeyboardInterrupt()))
     assert main(["table1", "--out", str(out)]) == 130
     assert not list(out.parent.iterdir())
+
+
+def interrupted(process, line, later=0.0):
+    """Interrupt a process some time [s] after it has printed a line; return its errors."""
+    assert any(printed == f"{line}\n" for printed in process.stdout)
+    time.sleep(later)
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate()
+    assert process.returncode == 130, err
+    return err
 
 
 def test_a_real_interrupt_ends_the_process_without_a_traceback(tmp_path, start):
@@ -50,13 +76,7 @@ def test_a_real_interrupt_ends_the_process_without_a_traceback(tmp_path, start):
         "paper.TrajectorySearch = lambda seed: print('searching') or TrajectorySearch(seed=seed, tolerance=0.0, rounds=10**6)\n"
     )
     code += "sys.exit(cli.main(['table1', '--seed', '1', '--out', 'results']))"
-    process = start("-uc", code, cwd=tmp_path)
-    assert process.stdout.readline()  # the search is under way
-    time.sleep(0.2)
-    process.send_signal(signal.SIGINT)
-    _, err = process.communicate()
-    assert process.returncode == 130, err
-    assert err.strip() == "idbench: interrupted"
+    assert interrupted(start("-uc", code, cwd=tmp_path), "searching", 0.2) == "idbench: interrupted\n"
     assert not list(tmp_path.iterdir())
 
 
@@ -67,7 +87,7 @@ def test_an_interrupt_that_python_ignores_comes_again(capfd):
         def __del__(self):
             signal.raise_signal(signal.SIGINT)
 
-    def interrupted():
+    def losing_one():
         with noticing():
             lock = Lock()
             del lock
@@ -76,7 +96,7 @@ def test_an_interrupt_that_python_ignores_comes_again(capfd):
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         with pytest.raises(KeyboardInterrupt):
-            interrupted()
+            losing_one()
     finally:
         signal.signal(signal.SIGINT, before)
     assert capfd.readouterr().err == ""
@@ -97,11 +117,7 @@ def test_an_interrupt_that_comes_out_as_another_error_is_one(tmp_path, start):
         paper.TrajectorySearch = half_loaded
         sys.exit(cli.main(["table1", "--seed", "1", "--out", "results"]))
     """
-    process = start("-uc", code, cwd=tmp_path)
-    assert process.stdout.readline()
-    process.send_signal(signal.SIGINT)
-    _, err = process.communicate()
-    assert (process.returncode, err.strip()) == (130, "idbench: interrupted")
+    assert interrupted(start("-uc", code, cwd=tmp_path), "searching") == "idbench: interrupted\n"
 
 
 @pytest.mark.thorough
@@ -118,12 +134,8 @@ def test_an_interrupt_while_a_module_is_loaded_is_as_quiet(tmp_path, module, sta
         from idbench.experiments.cli import main
         sys.exit(main(["table1", "--out", "x"]))
     """
-    process = start("-c", code, cwd=tmp_path)
-    assert any(line == "loading\n" for line in process.stdout)
-    process.send_signal(signal.SIGINT)
-    _, err = process.communicate()
     kept = "\nidbench: what was found is printed, and in x\n" if module == "rerun" else ""
-    assert (process.returncode, err) == (130, f"{kept}idbench: interrupted\n")
+    assert interrupted(start("-c", code, cwd=tmp_path), "loading") == f"{kept}idbench: interrupted\n"
     assert [listed(path) for path in tmp_path.iterdir()] == ([KEPT] if module == "rerun" else [])
 
 
@@ -155,38 +167,34 @@ def test_a_full_disk_is_one_line_and_what_has_room_is_kept(tmp_path, size, kept)
     assert not list(tmp_path.glob(".idbench-*"))
 
 
-def test_a_failure_of_a_view_is_one_line_and_the_rest_is_there(out, monkeypatch, capfd, complaint):
-    def full(*args):
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(idbench.experiments.recording.comparison_recording, "record_table1", full)
-    assert "the recording: No space left on device; what was found is printed, and in" in complaint("table1", "--out", str(out))
-    assert listed(out) == KEPT
-    assert list(out.parent.iterdir()) == [out]
-
-
 def test_results_that_cannot_be_written_leave_the_earlier_ones_whole(out, monkeypatch, complaint):
     assert main(["table1", "--no-rerun", "--out", str(out)]) == 0
     before = {path.name: path.read_bytes() for path in out.iterdir()}
-
-    def full(*args):
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr("idbench.experiments.cli.saving.write_summary", full)
+    monkeypatch.setattr("idbench.experiments.cli.saving.write_summary", raising(FULL))
     assert "No space left on device" in complaint("table1", "--no-rerun", "--out", str(out))
     assert {path.name: path.read_bytes() for path in out.iterdir()} == before
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("command", ["list", "table1"])
-def test_output_that_cannot_be_written_is_told_and_results_stay(command, tmp_path):
-    if not Path("/dev/full").exists():
-        pytest.skip("no device that is always full")
-    code = f"import sys; from idbench.experiments.cli import main; sys.exit(main([{command!r}]))"
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is always full")
+@pytest.mark.parametrize(
+    ("words", "kept"),
+    [
+        ("list", ()),
+        ("table1", ("runs/table1/summary.json",)),
+        (
+            "identify LOG --robot puma560 --model explicit --estimator WLS --no-rerun --out found",
+            ("found/summary.json", "found/report.html"),
+        ),
+    ],
+)
+def test_output_that_cannot_be_written_is_told_and_results_stay(words, kept, logs, tmp_path):
+    words = [str(logs / "first.parquet") if word == "LOG" else word for word in words.split()]
+    code = f"import sys; from idbench.experiments.cli import main; sys.exit(main({words}))"
     with Path("/dev/full").open("w") as full:
         done = subprocess.run(
             [sys.executable, "-c", code], cwd=tmp_path, stdout=full, stderr=subprocess.PIPE, text=True, check=False
         )
     assert done.returncode == 2
     assert done.stderr.splitlines()[0] == "idbench: cannot print: No space left on device"
-    assert (tmp_path / "runs" / "table1" / "summary.json").exists() == (command == "table1")
+    assert all((tmp_path / name).is_file() for name in kept)

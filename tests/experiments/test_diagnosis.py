@@ -1,7 +1,6 @@
 """What is wrong, as a user sees it: the first and the last line, what mends it, and what a summary says."""
 
 import csv
-import json
 
 import pytest
 
@@ -20,16 +19,14 @@ def scaled(source, target, column, factor):
 
 
 @pytest.mark.thorough
-def test_a_wrong_torque_constant_is_named_and_the_option_mends_it(idbench, tmp_path):
-    assert idbench("new", "example", "demo", "--robot", "puma560")[0] == 0
-    how = ["--robot", "demo/arm.xml", "--torque", "held", "--torque-delay", "0.002", "--model", "explicit", "--no-rerun"]
+def test_a_wrong_torque_constant_is_named_and_the_option_mends_it(ran, tmp_path):
+    ran("new example demo --robot puma560")
+    how = "--robot demo/arm.xml --torque held --torque-delay 0.002 --model explicit --no-rerun"
     scaled(tmp_path / "demo/log.csv", tmp_path / "bad.csv", "tau3", 1.1)
-    code, out, err = idbench("identify", "bad.csv", *how, "--out", "bad")
-    last = out.splitlines()[0]
-    assert code == 0
-    assert last.startswith("Result: fair")
-    assert "joint3: torque constant" in last
-    (first, *_) = json.loads((tmp_path / "bad/summary.json").read_text())["diagnosis"]
+    out, err, summary = ran("identify bad.csv", how, "--out bad")
+    assert out.startswith("Result: fair")
+    assert "joint3: torque constant" in out.splitlines()[0]
+    first = summary["diagnosis"][0]
     assert (first["cause"], first["joint"], first["unit"]) == ("gain", "joint3", "1")
     assert abs(first["size"] - 0.1) < 4 * first["sigma"] + 0.01
     assert first["held_out"][1] < first["held_out"][0]
@@ -38,9 +35,9 @@ def test_a_wrong_torque_constant_is_named_and_the_option_mends_it(idbench, tmp_p
     assert "torque constant" in figure
     assert "joint3" in figure
     assert first["remedy"] in err.replace("\n", " ") + out.replace("\n", " ")
-    code, out, _ = idbench("identify", "bad.csv", *how, *first["remedy"].split(), "--out", "good")
+    out, _, summary = ran("identify bad.csv", how, first["remedy"], "--out good")
     assert "Result: good" in out
-    assert json.loads((tmp_path / "good/summary.json").read_text())["diagnosis"] == []
+    assert summary["diagnosis"] == []
 
 
 def test_every_mistake_has_words():

@@ -12,7 +12,9 @@ from idbench.experiments.excite.design import Design
 from idbench.experiments.excite.excitation import EXCITATIONS
 from idbench.experiments.excite.excited import STAGES, Excited
 from idbench.experiments.results.writing import NAME as MANIFEST
-from idbench.sim.limits.motion_limits import MotionLimits
+from idbench.identify.design.plan import Plan
+from idbench.sim.limits.clearance import Clearance
+from idbench.sim.limits.motion_limits import MotionLimits, surroundings
 from idbench.sim.robot.inverse_dynamics import coulomb_torque, inverse_dynamics
 from idbench.sim.robot.robot import Robot
 from idbench.sim.scenario.measurement import TorqueMeasurement
@@ -22,6 +24,7 @@ TORQUES = (68.0, 104.0, 46.0, 6.0, 5.2, 4.4)
 """Of the motors of the PUMA, smaller than they are [N m]: they hold motions back."""
 
 SHORT = ["--duration", "4", "--no-rerun"]
+DESIGN = "excite scara --duration 4 --no-rerun --out out"
 
 
 @pytest.fixture(autouse=True)
@@ -71,11 +74,10 @@ def test_the_motion_starts_and_ends_at_rest_at_home_and_never_jumps(written):
     assert (np.abs(qdd) <= robot.most("acceleration")).all()
 
 
-def test_its_scenario_runs_and_its_errors_are_as_predicted(written, tmp_path):
+def test_its_scenario_runs_and_its_errors_are_as_predicted(written, ran):
     """Of one run: errors within four of the sigmas that were predicted before it."""
-    assert main(["run", str(written / "scenario.toml"), "--out", str(tmp_path / "run"), "--no-rerun"]) == 0
+    found = ran("run", written / "scenario.toml", "--out run --no-rerun").summary
     predicted = json.loads((written / "summary.json").read_text())
-    found = json.loads((tmp_path / "run" / "summary.json").read_text())
     off = np.subtract(found["models"]["explicit"]["estimate"], found["truth"])
     assert (np.abs(off) < 4 * np.array(predicted["sigma"])).all()
 
@@ -107,11 +109,11 @@ def test_limits_hold_at_a_thousand_hertz_by_mujocos_own_torques(kind):
 
 
 @pytest.mark.thorough
-def test_the_same_seed_gives_the_same_motion(tmp_path):
+def test_the_same_seed_gives_the_same_motion(tmp_path, ran):
     motions = []
-    for name in ("a", "b"):
-        assert main(["excite", "scara", *SHORT, "--seed", "3", "--out", str(tmp_path / name)]) == 0
-        motions.append((tmp_path / name / "motion.csv").read_bytes())
+    for _ in range(2):
+        ran(DESIGN, "--seed 3")
+        motions.append((tmp_path / "out" / "motion.csv").read_bytes())
     assert motions[0] == motions[1]
 
 
@@ -122,10 +124,9 @@ def test_another_design_does_not_replace_the_first_unasked(written, complaint):
 
 
 @pytest.mark.thorough
-def test_what_the_page_says_to_do_next_works(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    assert main(["excite", "scara", *SHORT]) == 0
-    assert main(["run", "runs/excited-scara/scenario.toml", "--no-rerun"]) == 0
+def test_what_the_page_says_to_do_next_works(tmp_path, ran):
+    ran("excite scara", "--duration 4 --no-rerun")
+    ran("run runs/excited-scara/scenario.toml --no-rerun")
     assert {x.name for x in (tmp_path / "runs").iterdir()} == {"excited-scara", "scara-excited"}
 
 
@@ -139,38 +140,28 @@ def test_a_slow_series_and_a_home_too_heavy(tmp_path, complaint):
 
 
 @pytest.mark.thorough
-def test_an_earlier_log_is_used(written, tmp_path, capsys):
+def test_an_earlier_log_is_used(written, ran):
     """What the log tells is added: sigmas are below those of the log, and below those of a motion without it."""
-    assert main(["run", str(written / "scenario.toml"), "--out", str(tmp_path / "run"), "--no-rerun"]) == 0
-    asked = ["--log", str(tmp_path / "run" / "log.parquet"), "--out", str(tmp_path / "next")]
-    assert main(["excite", "scara", *SHORT, *asked]) == 0
-    assert "earlier" in capsys.readouterr().out
-    summary = json.loads((tmp_path / "next" / "summary.json").read_text())
+    ran("run", written / "scenario.toml", "--out run --no-rerun")
+    out, _, summary = ran(DESIGN, "--log run/log.parquet")
+    assert "earlier" in out
     assert (np.array(summary["sigma"]) < summary["earlier"]).all()
-    assert main(["excite", "scara", *SHORT, "--out", str(tmp_path / "alone")]) == 0
-    alone = json.loads((tmp_path / "alone" / "summary.json").read_text())
+    alone = ran(DESIGN, "--force").summary
     assert (np.array(summary["sigma"]) < 0.9 * np.array(alone["sigma"])).all()
 
 
 @pytest.mark.thorough
-def test_what_is_weighed_comes_out_better(tmp_path):
-    sigmas = []
-    for weights in ([], ["--weigh", "ZZR1=20"]):
-        out = tmp_path / str(len(weights))
-        assert main(["excite", "scara", *SHORT, *weights, "--out", str(out)]) == 0
-        sigmas.append(json.loads((out / "summary.json").read_text())["sigma"][0])
-    assert sigmas[1] < 0.8 * sigmas[0]
+def test_what_is_weighed_comes_out_better(ran):
+    plain, weighed = (ran(DESIGN, "--force", weights).summary for weights in ("", "--weigh ZZR1=20"))
+    assert weighed["sigma"][0] < 0.8 * plain["sigma"][0]
 
 
 @pytest.mark.thorough
-def test_a_keep_out_box_is_kept_out_of(tmp_path):
+def test_a_keep_out_box_is_kept_out_of(tmp_path, ran):
     """Of the box of the file, by MuJoCo's own distances at every sample of what is written."""
-    from idbench.sim.limits.clearance import Clearance
-    from idbench.sim.limits.motion_limits import surroundings
-
     limits = tmp_path / "limits.toml"
     limits.write_text('[[keep_out]]\nname = "post"\nlowest = [0.3, 0.35, 0]\nhighest = [0.45, 0.5, 1]\n')
-    assert main(["excite", "scara", *SHORT, "--seed", "3", "--limits", str(limits), "--out", str(tmp_path / "out")]) == 0
+    ran(DESIGN, "--seed 3 --limits limits.toml")
     _, rows = table(tmp_path / "out")
     robot = surroundings("scara", MotionLimits.read(limits))
     found = Clearance(robot, robot.ranges, 0.01)
@@ -179,30 +170,25 @@ def test_a_keep_out_box_is_kept_out_of(tmp_path):
 
 
 @pytest.mark.thorough
-def test_motions_follow_until_all_is_known(tmp_path, capsys):
-    out = tmp_path / "out"
-    assert main(["excite", "scara", *SHORT, "--until", "0.18%", "--out", str(out)]) == 0
-    summary = json.loads((out / "summary.json").read_text())
+def test_motions_follow_until_all_is_known(ran):
+    out, _, summary = ran(DESIGN, "--until 0.18%")
     shares = [each["brisk_share"] for each in summary["rounds"]]
     assert shares == sorted(shares, reverse=True)
     assert shares[-1] < 0.0018 <= shares[-2]
-    assert "motion 1" in capsys.readouterr().out
+    assert "motion 1" in out
 
 
 @pytest.mark.thorough
-def test_what_stays_unknown_is_told_and_nothing_is_lost(tmp_path, monkeypatch, capsys):
+def test_what_stays_unknown_is_told_and_nothing_is_lost(tmp_path, monkeypatch, ran):
     monkeypatch.setattr("idbench.experiments.excite.sequence.ROUNDS", 1)
-    out = tmp_path / "out"
-    assert main(["excite", "scara", *SHORT, "--until", "0.0001%", "--out", str(out)]) == 0
-    assert re.search("not reached after 1 motions: F[sv]2 still makes", capsys.readouterr().out)
-    assert {"log1.parquet", "motion1.csv", "motion.csv"} < ({x.name for x in out.iterdir()} - {MANIFEST})
+    assert re.search("not reached after 1 motions: F[sv]2 still makes", ran(DESIGN, "--until 0.0001%").out)
+    assert {"log1.parquet", "motion1.csv", "motion.csv"} < ({x.name for x in (tmp_path / "out").iterdir()} - {MANIFEST})
 
 
 @pytest.mark.thorough
-def test_ways_keep_the_limits_that_were_given(tmp_path):
-    limits = tmp_path / "limits.toml"
-    limits.write_text("velocity = 0.3\nacceleration = 2.0\nhome = [1.5, 1.5]\n")
-    assert main(["excite", "scara", *SHORT, "--limits", str(limits), "--out", str(tmp_path / "out")]) == 0
+def test_ways_keep_the_limits_that_were_given(tmp_path, ran):
+    (tmp_path / "limits.toml").write_text("velocity = 0.3\nacceleration = 2.0\nhome = [1.5, 1.5]\n")
+    ran(DESIGN, "--limits limits.toml")
     _, rows = table(tmp_path / "out")
     np.testing.assert_allclose(rows[[0, -1], 2:4], 1.5)
     assert np.abs(rows[:, 4:6]).max() <= 0.3
@@ -224,9 +210,7 @@ def test_motors_stay_cool_however_often_a_motion_is_run():
 
 
 @pytest.mark.thorough
-def test_ctrl_c_keeps_the_best_so_far(tmp_path, monkeypatch, capsys):
-    from idbench.identify.design.plan import Plan
-
+def test_ctrl_c_keeps_the_best_so_far(monkeypatch, ran):
     calls, value = [0], Plan.value
 
     def interrupted(self, c):
@@ -237,6 +221,6 @@ def test_ctrl_c_keeps_the_best_so_far(tmp_path, monkeypatch, capsys):
 
     monkeypatch.setattr("idbench.experiments.excite.excited.STAGES", STAGES)
     monkeypatch.setattr(Plan, "value", interrupted)
-    assert main(["excite", "scara", *SHORT, "--out", str(tmp_path / "out")]) == 0
-    assert "interrupted: this is the best motion so far" in capsys.readouterr().out
-    assert json.loads((tmp_path / "out" / "summary.json").read_text())["interrupted"] is True
+    out, _, summary = ran(DESIGN)
+    assert "interrupted: this is the best motion so far" in out
+    assert summary["interrupted"] is True

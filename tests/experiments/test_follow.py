@@ -20,7 +20,7 @@ def whole(table1, tmp_path):
 
 
 @pytest.mark.thorough
-def test_estimates_come_while_the_log_grows_and_the_last_is_of_all_of_it(whole, tmp_path, capsys):
+def test_estimates_come_while_the_log_grows_and_the_last_is_of_all_of_it(whole, tmp_path, ran):
     path, pieces = tmp_path / "grows.csv", np.array_split(np.array(whole, dtype=object), 5)
 
     def write():
@@ -34,13 +34,12 @@ def test_estimates_come_while_the_log_grows_and_the_last_is_of_all_of_it(whole, 
 
     writer = threading.Thread(target=write)
     writer.start()
-    assert main(["identify", str(path), *TORQUE, "--follow", "4", "--model", "explicit"]) == 0
+    words = ("identify", path, *TORQUE, "--model explicit")
+    printed, told, _ = ran(*words, "--follow 4")
     writer.join()
-    printed, told = capsys.readouterr()
     assert "8 of 8 parameters known to 10 %" in told
     assert f"following {path}" in told
-    assert main(["identify", str(path), *TORQUE, "--model", "explicit"]) == 0
-    assert capsys.readouterr().out == printed
+    assert ran(*words).out == printed
 
 
 def test_what_cannot_be_followed_is_refused(whole, tmp_path, capsys):

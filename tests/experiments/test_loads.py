@@ -1,13 +1,11 @@
 """Payloads and gains of drives, of a simulated arm whose truth is known, and what the commands say."""
 
-import json
 import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from idbench.experiments.cli import main
 from idbench.experiments.errors import ExperimentError, ResultsError
 from idbench.experiments.loads.job import payload_of
 from idbench.experiments.loads.simulated import Pairs
@@ -157,14 +155,15 @@ def files(pairs, tmp_path, monkeypatch):
     return tmp_path
 
 
-def test_the_payload_command(files, capsys):
-    words = ["payload", "full.parquet", "--unloaded", "empty.parquet", "--robot", "puma560", "--estimator", "WLS"]
-    assert main([*words, "--write-mjcf", "arm.xml", "--out", "found"]) == 0
-    mass = re.search(r"the nearest physically consistent body: ([\d.]+) kg", capsys.readouterr().out)
+PAIR = "full.parquet --unloaded empty.parquet --robot puma560 --estimator WLS --out found"
+
+
+def test_the_payload_command(files, ran):
+    out, _, summary = ran("payload", PAIR, "--write-mjcf arm.xml")
+    mass = re.search(r"the nearest physically consistent body: ([\d.]+) kg", out)
     assert float(mass[1]) == pytest.approx(2.0, rel=0.01)
     robot = Robot.load(str(files / "arm.xml"))
     assert robot.model.body("payload").mass[0] == pytest.approx(2.0, rel=0.01)
-    summary = json.loads((files / "found" / "summary.json").read_text())
     assert summary["body"]["mass"] == pytest.approx(2.0, rel=0.01)
     assert len(summary["ways"]["together"]["covariance"]) == 10
     report = (files / "found" / "report.html").read_text()
@@ -172,34 +171,29 @@ def test_the_payload_command(files, capsys):
     assert "payload, about the origin of the frame of joint6" in report
 
 
-def test_a_payload_is_shown_though_it_cannot_be_saved(files, capsys, monkeypatch):
+def test_a_payload_is_shown_though_it_cannot_be_saved(files, idbench, monkeypatch):
     def full(*_):
         raise ResultsError("cannot write to found: No space left on device")
 
     monkeypatch.setattr("idbench.experiments.cli.commands.loads.save_summary", full)
-    words = ["payload", "full.parquet", "--unloaded", "empty.parquet", "--robot", "puma560", "--estimator", "WLS"]
-    assert main([*words, "--out", "found"]) == 2
-    out, err = capsys.readouterr()
+    code, out, err = idbench("payload", *PAIR.split())
+    assert code == 2
     assert "payload, about the origin of the frame of joint6" in out
     assert "No space left on device" in err
 
 
 @pytest.mark.thorough
-def test_the_payload_of_a_robot_identified_before(files):
-    identify = ["identify", "empty.parquet", "--robot", "puma560", "--model", "explicit", "--estimator", "WLS"]
-    assert main([*identify, "--write", "arm.json"]) == 0
-    assert main(["payload", "full.parquet", "--before", "arm.json", "--robot", "puma560", "--out", "found"]) == 0
-    found = json.loads((files / "found" / "summary.json").read_text())
+def test_the_payload_of_a_robot_identified_before(files, ran):
+    ran("identify empty.parquet --robot puma560 --model explicit --estimator WLS --write arm.json")
+    found = ran("payload full.parquet --before arm.json --robot puma560 --out found").summary
     assert found["body"]["mass"] == pytest.approx(2.0, rel=0.01)
 
 
 @pytest.mark.thorough
-def test_the_gains_command(files, capsys):
-    words = ["gains", "full.parquet", "--unloaded", "empty.parquet", "--robot", "puma560", "--estimator", "WLS"]
-    assert main([*words, "--mass", "2.0", "--out", "found"]) == 0
+def test_the_gains_command(files, ran):
+    out, _, summary = ran("gains", PAIR, "--mass 2.0")
     assert "gains of the drives" in (files / "found" / "report.html").read_text()
-    assert "to read logs with them: --gain " in capsys.readouterr().out
-    summary = json.loads((files / "found" / "summary.json").read_text())
+    assert "to read logs with them: --gain " in out
     np.testing.assert_allclose(summary["gains"], 1.0, rtol=0.02)
 
 
@@ -256,12 +250,9 @@ def test_the_command_that_shows_the_gains_is_said_in_full(files):
 
 
 @pytest.mark.thorough
-def test_all_ways_are_compared_on_a_simulated_robot(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    assert main(["payload", "--simulate", "payload", "--runs", "1", "--out", "ways"]) == 0
-    out = capsys.readouterr().out
+def test_all_ways_are_compared_on_a_simulated_robot(ran):
+    out, _, summary = ran("payload --simulate payload --runs 1 --out ways")
     assert "within 2 sigma" in out
-    summary = json.loads((tmp_path / "ways" / "summary.json").read_text())
     assert set(summary["ways"]) == set(WAYS)
     assert len(summary["ways"]["together"]["rms"]) == len(summary["ways"]["together"]["parameters"]) > 0
 

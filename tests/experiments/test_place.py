@@ -185,16 +185,6 @@ def test_commands_ask_before_the_work(tmp_path, complaint, monkeypatch):
     assert {path.name: path.read_bytes() for path in (tmp_path / "kept").iterdir()} == before
 
 
-@pytest.mark.thorough
-def test_another_estimator_does_not_replace_a_run_unsaid(tmp_path, complaint, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    assert main([*RUN, "kept"]) == 0
-    summary = (tmp_path / "kept" / "summary.json").read_bytes()
-    line = complaint(*RUN, "kept", "--estimator", "OLS")
-    assert "kept holds the results of `uv run idbench run ideal`: choose another --out" in line
-    assert (tmp_path / "kept" / "summary.json").read_bytes() == summary
-
-
 def test_resample_export_and_log_replace_nothing(tmp_path, complaint, log):
     write_log(log, tmp_path / "log.parquet")
     words = "resample", str(tmp_path / "log.parquet"), "--fs", "50", "--out"

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from idbench.experiments.cli import main
 from idbench.experiments.identification.rates import Rates, moved
 from idbench.identify import NoPrefilter, idbench_chain, paper_chain
 from idbench.sim import load_scenario
@@ -35,9 +34,7 @@ def test_the_papers_chain_obeys_the_papers_rules():
     assert "wfq" not in str(Rates.of(plain, 100.0, 800, 1.0, "as stated", np.zeros((2, 10))))
 
 
-def test_identify_states_it(tmp_path, capsys):
-    assert main(["run", "ideal", "--no-rerun", "-v", "--out", str(tmp_path / "run")]) == 0
-    assert "wdyn 2.39 Hz (of the scenario's controller)" in capsys.readouterr().out
-    log = str(tmp_path / "run" / "log.parquet")
-    assert main(["identify", log, "--torque", "held", "--wdyn", "2", "--no-rerun", "--verbose"]) == 0
-    assert "wdyn 2 Hz (as stated); fs 50 wdyn" in capsys.readouterr().out
+def test_identify_states_it(ran):
+    assert "wdyn 2.39 Hz (of the scenario's controller)" in ran("run ideal --no-rerun -v --out run").out
+    words = "--torque held --wdyn 2 --no-rerun --verbose"
+    assert "wdyn 2 Hz (as stated); fs 50 wdyn" in ran("identify run/log.parquet", words).out

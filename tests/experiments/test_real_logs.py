@@ -2,7 +2,6 @@
 
 import json
 import re
-import runpy
 
 import numpy as np
 import pytest
@@ -13,6 +12,7 @@ from idbench.sim.robot.inverse_dynamics import coulomb_torque, inverse_dynamics
 from idbench.sim.robot.robot import Robot
 
 PUMA = ("--robot", "puma560")
+EXPLICIT = "--robot puma560 --no-rerun --model explicit"
 
 
 def as_csv(log, path, *, names=None, t=None, rows=slice(None), scale=(1.0, 1.0), qd=None):
@@ -26,10 +26,6 @@ def as_csv(log, path, *, names=None, t=None, rows=slice(None), scale=(1.0, 1.0),
     return path
 
 
-def found(folder="out"):
-    return json.loads((folder / "summary.json").read_text())
-
-
 def unseen(summary, k=0, model="explicit"):
     return np.array(summary["validations"][k]["models"][model]["torque_error_rms"])
 
@@ -40,7 +36,7 @@ def first(logs):
 
 
 @pytest.mark.thorough
-def test_several_logs_of_other_rates_meanings_and_kinds_in_one_fit(idbench, logs, first, tmp_path):
+def test_several_logs_of_other_rates_meanings_and_kinds_in_one_fit(ran, logs, first, tmp_path):
     """Two halves, one of them at a third of the rate, measured instead of averaged, in degrees and mN m."""
     half = first.samples // 2
     slow = first.part(half, first.samples)
@@ -49,53 +45,40 @@ def test_several_logs_of_other_rates_meanings_and_kinds_in_one_fit(idbench, logs
         names=["time", *(f"pos{j} [deg]" for j in range(6)), *(f"eff{j} [mNm]" for j in range(6))],
     )  # fmt: skip
     write_log(first.part(0, half), tmp_path / "a.parquet")
-    assert idbench("log", "b.csv", "--write")[0] == 0
+    ran("log b.csv --write")
     layout = (tmp_path / "b.toml").read_text().partition("[torque]")[0]
     (tmp_path / "b.toml").write_text(f'{layout}[torque]\nmeaning = "averaged"\ndelay = {first.torque.delay}\n')
-    code, out, _ = idbench(
-        "identify", "a.parquet", "b.csv", *PUMA, "--validate", logs / "second.parquet", "--out", "out",
-        "--no-rerun", "--model", "explicit",
-    )  # fmt: skip
-    assert code == 0
-    summary = found(tmp_path / "out")
+    out, _, summary = ran("identify a.parquet b.csv", EXPLICIT, "--out out --validate", logs / "second.parquet")
     assert [log["name"] for log in summary["logs"]] == ["a.parquet", "b.csv"]
     errors = np.array([log["torque_error_rms"]["explicit"] for log in summary["logs"]])
     assert errors.shape == (2, 6)
     assert "residual of the explicit model in each log" in out
-    words = ("--validate", logs / "second.parquet", "--out", "one", "--no-rerun", "--model", "explicit")
-    assert idbench("identify", "a.parquet", *PUMA, *words)[0] == 0
+    one = ran("identify a.parquet", EXPLICIT, "--out one --validate", logs / "second.parquet").summary
     # Each half shows half of the motion: together they know more.
-    sigmas = [np.array(x["models"]["explicit"]["sigma_noise"]) for x in (summary, found(tmp_path / "one"))]
+    sigmas = [np.array(x["models"]["explicit"]["sigma_noise"]) for x in (summary, one)]
     assert np.mean(sigmas[0] < sigmas[1]) > 0.9
-    assert (unseen(summary) < 1.1 * unseen(found(tmp_path / "one"))).all()
+    assert (unseen(summary) < 1.1 * unseen(one)).all()
 
 
 @pytest.mark.thorough
-def test_each_log_is_judged_by_itself(idbench, logs, first, tmp_path):
+def test_each_log_is_judged_by_itself(ran, logs, first, tmp_path):
     write_log(MotionLog(first.fs, first.q, 1.1 * first.tau, first.torque), tmp_path / "wrong.parquet")
-    code, out, _ = idbench(
-        "identify", logs / "second.parquet", *PUMA, "--validate", logs / "first.parquet", "wrong.parquet", "--out", "out",
-        "--no-rerun", "--model", "explicit",
-    )  # fmt: skip
-    assert code == 0
-    summary = found(tmp_path / "out")
+    held_out = "--out out --validate", logs / "first.parquet", "wrong.parquet"
+    out, _, summary = ran("identify", logs / "second.parquet", EXPLICIT, *held_out)
     assert (unseen(summary, 1) > 2 * unseen(summary, 0)).any()
     assert out.count(": torque error while moving") == 2
     assert summary["validation"] == summary["validations"][0]
 
 
 @pytest.mark.thorough
-def test_repeated_rows_are_left_out(idbench, logs, first, tmp_path, rng):
+def test_repeated_rows_are_left_out(ran, logs, first, tmp_path, rng):
     """One row in sixteen is the one before, written again."""
     seen = np.maximum.accumulate(np.where(rng.uniform(size=first.samples) > 0.06, np.arange(first.samples), 0))
     as_csv(first, tmp_path / "log.csv", t=first.t, rows=seen)
-    words = ("identify", "log.csv", *PUMA, "--torque", "averaged", "--validate", logs / "second.parquet", "--no-rerun",
-             "--model", "explicit")  # fmt: skip
-    assert idbench(*words, "--out", "as-is")[0] == 0
-    code, out, _ = idbench(*words, "--out", "repaired", "--resample")
-    assert code == 0
-    assert "repeat the row before while the robot moves: left out" in out
-    before, after = (unseen(found(tmp_path / name)) for name in ("as-is", "repaired"))
+    words = "identify log.csv", EXPLICIT, "--torque averaged --validate", logs / "second.parquet"
+    as_is, repaired = ran(*words, "--out as-is"), ran(*words, "--out repaired --resample")
+    assert "repeat the row before while the robot moves: left out" in repaired.out
+    before, after = unseen(as_is.summary), unseen(repaired.summary)
     assert (after < 1.1 * before).all()
     assert np.mean(after / before) < 0.9
 
@@ -111,39 +94,37 @@ def test_times_that_jitter_are_refused_with_the_way_out_which_works(idbench, fir
     np.testing.assert_allclose(made.q, first.q[: made.samples], atol=2e-4)  # 0.1 ms, to which the clock is known, at 2 rad/s
 
 
-def test_a_log_with_a_gap_becomes_two(idbench, first, tmp_path):
+def test_a_log_with_a_gap_becomes_two(ran, first, tmp_path):
     kept = (first.t < 3) | (first.t > 3.4)
     as_csv(first, tmp_path / "log.csv", t=first.t[kept], rows=kept)
-    assert idbench("resample", "log.csv", "--torque", "averaged", "--out", "even.parquet")[0] == 0
+    ran("resample log.csv --torque averaged --out even.parquet")
     assert read_log(tmp_path / "even1.parquet").samples == 750
     assert read_log(tmp_path / "even2.parquet").fs == pytest.approx(250.0)
 
 
 @pytest.mark.thorough
-def test_a_short_fast_log_gets_the_band_that_it_needs(idbench, first, tmp_path):
+def test_a_short_fast_log_gets_the_band_that_it_needs(idbench, ran, first, tmp_path):
     """Seven seconds: 70 instants at 5 Hz for 52 parameters, from which the power model cannot be identified at all."""
     write_log(first.part(0, round(7 * first.fs)), tmp_path / "short.parquet")
     words = ("identify", "short.parquet", *PUMA, "--no-rerun", "--model")
-    code, out, _ = idbench(*words, "power", "--out", "chosen")
-    assert code == 0
+    out, _, chosen = ran(*words, "power --out chosen")
     assert "chosen by the log" in out
     assert "instants for 52 parameters, where 5 Hz leave 70" in out
-    assert found(tmp_path / "chosen")["models"]["power"]["rows"] > 150
+    assert chosen["models"]["power"]["rows"] > 150
     _, out, _ = idbench(*words, "power", "--cutoff", "5")
     assert "this log does not excite" in " ".join(out.split())
 
 
 @pytest.mark.thorough
-def test_a_chain_of_a_file(idbench, log, tmp_path):
+def test_a_chain_of_a_file(ran, log, tmp_path):
     (tmp_path / "chain.toml").write_text('chain = "idbench"\n[operator]\ncutoff = 12.0\n[mask]\nkind = "none"\n')
     write_log(log, tmp_path / "log.parquet")
-    words = ("identify", "log.parquet", "--out", "file", "--chain-file", "chain.toml", "--no-rerun")
-    assert idbench(*words, "--model", "explicit")[0] == 0
-    assert found(tmp_path / "file")["cutoff"] == 12.0
+    words = "identify log.parquet --out file --chain-file chain.toml --no-rerun --model explicit"
+    assert ran(words).summary["cutoff"] == 12.0
 
 
 @pytest.mark.thorough
-def test_a_robot_with_more_joints_than_the_log(idbench, first, tmp_path):
+def test_a_robot_with_more_joints_than_the_log(idbench, ran, first, tmp_path):
     """The wrist was held: its columns are not in the log. What follows from them belongs to the forearm."""
     robot = Robot.load("puma560")
     held = np.concatenate([first.q[:, :3], np.zeros((first.samples, 3))], axis=1)
@@ -155,70 +136,37 @@ def test_a_robot_with_more_joints_than_the_log(idbench, first, tmp_path):
     _, _, told = idbench("identify", "arm.parquet", *PUMA)
     names = robot.joints[:3]
     assert f"--joints {' '.join(names)} (the others are held at 0" in told
-    code, out, _ = idbench(
-        "identify", "arm.parquet", *PUMA, "--joints", *names, "--no-rerun", "--model", "explicit", "--write-mjcf", "arm.xml",
-    )  # fmt: skip
-    assert code == 0
+    out = ran("identify arm.parquet", EXPLICIT, "--write-mjcf arm.xml --joints", *names).out
     assert re.match(r"Result: (good|fair) \(explicit model\), torque errors of at most 0\.0", out)
     assert Robot.load(str(tmp_path / "arm.xml")).joints == names
 
 
 @pytest.mark.thorough
-def test_torques_that_do_not_see_rotors_are_told_apart(idbench, logs, first, tmp_path):
+def test_torques_that_do_not_see_rotors_are_told_apart(ran, logs, first, tmp_path):
     """Sensors behind the gears: what the robot's file says of rotors is missing in the torques."""
     qdd = np.gradient(np.gradient(first.q, 1 / first.fs, axis=0), 1 / first.fs, axis=0)
     rotors = Robot.load("puma560").model.dof_armature
     smooth = np.apply_along_axis(lambda x: np.convolve(x, np.ones(5) / 5, mode="same"), 0, qdd)
     write_log(MotionLog(first.fs, first.q, first.tau - 1.2 * rotors * smooth, first.torque), tmp_path / "links.parquet")
-    words = ("identify", "links.parquet", *PUMA, "--no-rerun", "--model", "explicit")
-    _, out, _ = idbench(*words)
-    assert "are these torques measured at the links, behind the gears? Then add --armature none" in " ".join(out.split())
-    _, out, _ = idbench("identify", logs / "first.parquet", *PUMA, "--no-rerun", "--model", "explicit")
-    assert "measured at the links" not in out
-    code, out, _ = idbench(*words, "--armature", "none", "--friction", "none", "--out", "out")
-    assert code == 0
-    assert not [name for name in found(tmp_path / "out")["parameters"] if name.startswith(("Ia", "Fv", "Fs"))]
+    words = f"identify links.parquet {EXPLICIT}"
+    said = "are these torques measured at the links, behind the gears? Then add --armature none"
+    assert said in " ".join(ran(words).out.split())
+    assert "measured at the links" not in ran("identify", logs / "first.parquet", EXPLICIT).out
+    summary = ran(words, "--armature none --friction none --out out").summary
+    assert not [name for name in summary["parameters"] if name.startswith(("Ia", "Fv", "Fs"))]
 
 
 @pytest.mark.thorough
-def test_what_is_written_makes_the_torques_that_were_identified(idbench, logs, tmp_path):
-    """The function for a controller, against MuJoCo's inverse dynamics of the robot that is written beside it."""
-    code, _, _ = idbench(
-        "identify", logs / "first.parquet", *PUMA, "--no-rerun", "--model", "explicit", "--write-mjcf", "arm.xml", "--write",
-        "arm.py", "arm.json", "arm.urdf",
-    )  # fmt: skip
-    assert code == 0
-    written, function = Robot.load(str(tmp_path / "arm.xml")), runpy.run_path(str(tmp_path / "arm.py"))
-    rng = np.random.default_rng(0)
-    q, qd, qdd = (rng.uniform(-1, 1, (20, 6)) for _ in range(3))
-    tau = inverse_dynamics(written, q, qd, qdd) + coulomb_torque(written, qd)
-    # The physically consistent bodies are some sigma from the estimate, which the function has as it is.
-    assert np.abs(function["inverse_dynamics"](q, qd, qdd) - tau).max() < 0.01 * np.abs(tau).max()
-    assert function["JOINTS"] == written.joints
-    np.testing.assert_allclose(function["inverse_dynamics"](q[0], qd[0], qdd[0]), function["inverse_dynamics"](q, qd, qdd)[0])
-    urdf = Robot.load(str(tmp_path / "arm.urdf"))
-    again = inverse_dynamics(urdf, q, qd, qdd) + coulomb_torque(urdf, qd)  # rotors included
-    np.testing.assert_allclose(again, tau, atol=1e-5 * np.abs(tau).max())  # angles of a URDF become quaternions
-    base = json.loads((tmp_path / "arm.json").read_text())
-    assert len(base["covariance"]) == len(base["parameters"]) == 52
-    assert base["parameters"][0]["made_of"]
-
-
-@pytest.mark.thorough
-def test_the_report_says_in_a_minute_whether_to_trust_it(idbench, logs, tmp_path):
-    code, _, _ = idbench(
-        "identify", logs / "first.parquet", *PUMA, "--validate", logs / "second.parquet", "--out", "out", "--no-rerun",
-        "--torque-delay", "0.001",
-    )  # fmt: skip
-    assert code == 0
+def test_the_report_says_in_a_minute_whether_to_trust_it(ran, logs, tmp_path):
+    words = "--robot puma560 --out out --no-rerun --torque-delay 0.001 --validate"
+    summary = ran("identify", logs / "first.parquet", words, logs / "second.parquet").summary
     page = (tmp_path / "out" / "report.html").read_text()
     for words in ("explicit", "Check these first", "held-out log", "--torque-delay", "XX", "Friction", "residuals"):
         assert words in page, words
     # Torques, residuals, friction and spectra of six joints, and what the wrong delay explains.
     assert page.count('<div class="panels">') == 5
     assert page.count('<svg class="curves"') == 25
-    parameters = json.loads((tmp_path / "out" / "summary.json").read_text())["parameters"]
-    assert page.count('<svg class="interval"') == len(parameters)
+    assert page.count('<svg class="interval"') == len(summary["parameters"])
     assert 'src="http' not in page
     assert "<link" not in page
     assert f"--validate {logs / 'second.parquet'}" in page

@@ -1,34 +1,30 @@
 """Any robot from the command line, as a user asks."""
 
-import json
 from dataclasses import replace
 
 import pytest
+from pyarrow import csv, parquet
 
 from idbench.sim.robot.robot import Robot
 from idbench.sim.robot.tree import standard_parameters
 from idbench.sim.scenario.scenario_file import load, to_toml
 
 
-def test_robot_tells_what_can_be_identified(idbench):
-    code, out, _ = idbench("robot", "scara")
-    assert code == 0
-    assert "8 parameters that a motion can identify" in out
-    code, out, _ = idbench("robot", Robot.path("scara"))
-    assert code == 0
+def test_robot_tells_what_can_be_identified(ran):
+    assert "8 parameters that a motion can identify" in ran("robot scara").out
+    out = ran("robot", Robot.path("scara")).out
     assert "ZZ1 + Ia1 + 0.25 M2" in out
     assert "no motion excites" in out
-    code, out, _ = idbench("robot", "puma560", "--armature", "all", "--add", "offset")
+    out = ran("robot puma560 --armature all --add offset").out
     assert "58 parameters that a motion can identify" in out  # 36 + 4 rotors of their own + 18 of friction
     assert "torque budget" in out
     assert "97.6" in out
 
 
 @pytest.mark.thorough
-def test_identify_validates_and_writes_the_file(idbench, logs, tmp_path):
-    words = "--robot", "puma560", "--validate", logs / "second.parquet", "--write-mjcf", "out.xml", "--out", "results"
-    code, out, err = idbench("identify", logs / "first.parquet", *words, "--no-rerun", "-v")
-    assert code == 0, err
+def test_identify_validates_and_writes_the_file(ran, logs, tmp_path):
+    words = "--robot puma560 --write-mjcf out.xml --out results --no-rerun -v --validate"
+    out, _, summary = ran("identify", logs / "first.parquet", words, logs / "second.parquet")
     assert "explicit: good: the torque of joint" in out
     assert "at rest and reversing, where friction is not determined: joint1" in out
     assert "written to out.xml: the robot with the parameters of the explicit model" in out
@@ -36,39 +32,15 @@ def test_identify_validates_and_writes_the_file(idbench, logs, tmp_path):
     truth = standard_parameters(Robot.load("puma560"))
     for name in ("Fv1", "Fs1", "Ia3", "Fs6"):
         assert made[name] == pytest.approx(truth[name], rel=0.02)
-    summary = json.loads((tmp_path / "results" / "summary.json").read_text())
     assert summary["robot"] == "puma560"
     assert summary["validation"]["models"]["power"]["verdict"] == "good"
     assert len(summary["validation"]["models"]["explicit"]["position_error_rms"]) == 6
 
 
 @pytest.mark.thorough
-def test_without_a_second_log_the_end_of_the_first_is_held_out(idbench, logs):
-    code, out, _ = idbench("identify", logs / "first.parquet", "--robot", "puma560", "--model", "explicit")
-    assert code == 0
-    assert "the last quarter of the log, by a fit of the rest" in out
-
-
-@pytest.mark.thorough
-def test_run_takes_any_robot(idbench, tmp_path):
-    arm = load("arm")
-    scenario = replace(arm, name="short", fs=250.0, trajectory=replace(arm.trajectory, moves=8))
-    (tmp_path / "short.toml").write_text(to_toml(scenario))
-    code, out, err = idbench("run", "short.toml", "--robot", "puma560", "--out", "mine", "--estimator", "WLS")
-    assert code == 0, err
-    summary = json.loads((tmp_path / "mine" / "summary.json").read_text())
-    assert summary["robot"] == "puma560"
-    assert len(summary["truth"]) == 52
-    code, out, err = idbench("identify", "mine", "--model", "explicit", "--label", "again")
-    assert code == 0, err
-    assert "added to the recording" in out
-
-
-@pytest.mark.thorough
-def test_a_fixed_trajectory_of_another_robot_is_replaced(idbench, tmp_path):
+def test_a_fixed_trajectory_of_another_robot_is_replaced(ran, tmp_path):
     (tmp_path / "two.toml").write_text(to_toml(replace(load("ideal"), name="two", fs=100.0)))
-    code, out, err = idbench("run", "two.toml", "--robot", "panda", "--no-rerun", "--estimator", "WLS")
-    assert code == 0, err
+    out = ran("run two.toml --robot panda --no-rerun --estimator WLS").out
     assert "does not fit robot panda: the random moves of scenario arm are used" in out
     assert (tmp_path / "runs" / "two-panda" / "summary.json").exists()
 
@@ -88,94 +60,75 @@ def test_parameters_can_be_left_out_and_laws_added(idbench, logs):
     assert "--add armature: that is no law of a joint's friction; known: viscous, coulomb, offset" in err
 
 
-@pytest.mark.thorough
-def test_joints_by_name_are_put_in_order_and_unknown_ones_refused(idbench, logs, tmp_path):
-    from pyarrow import csv, parquet
+def by_joint(columns):
+    """Return the names of columns as of a log whose joints have names."""
+    return [name.replace("tau", "tau_joint").replace("q", "q_joint") for name in columns]
 
+
+@pytest.mark.thorough
+def test_joints_by_name_are_put_in_order_and_unknown_ones_refused(idbench, ran, logs, tmp_path):
     table = parquet.read_table(logs / "first.parquet")
     order = [0, 3, 1, 2, 4, 6, 5]  # of t and the joints
     columns = [table.column_names[k] for k in order] + [table.column_names[6 + k] for k in order[1:]]
     mixed = table.select(columns).replace_schema_metadata({})
-    names = [name.replace("tau", "tau_joint").replace("q", "q_joint") for name in columns]
-    csv.write_csv(mixed.rename_columns(names), tmp_path / "named.csv")
-    words = "--robot", "puma560", "--model", "explicit", "--torque", "held", "--torque-delay", "0.000659"
-    code, out, err = idbench("identify", "named.csv", *words)
-    assert code == 0, err
-    _, plain, _ = idbench("identify", logs / "first.parquet", *words)
+    csv.write_csv(mixed.rename_columns(by_joint(columns)), tmp_path / "named.csv")
+    words = "--robot puma560 --model explicit --torque held --torque-delay 0.000659"
+    out, plain = ran("identify named.csv", words).out, ran("identify", logs / "first.parquet", words).out
     assert next(x for x in out.splitlines() if " MYR3 " in x) == next(x for x in plain.splitlines() if " MYR3 " in x)
-    csv.write_csv(mixed.rename_columns([name.replace("joint3", "elbow") for name in names]), tmp_path / "other.csv")
-    code, _, err = idbench("identify", "other.csv", *words)
+    csv.write_csv(mixed.rename_columns([name.replace("joint3", "elbow") for name in by_joint(columns)]), tmp_path / "other.csv")
+    code, _, err = idbench("identify", "other.csv", *words.split())
     assert code == 2
     assert "missing: joint3; not the robot's: elbow" in err
 
 
 @pytest.mark.thorough
-def test_the_closed_form_is_written_too(idbench, tmp_path):
+def test_the_closed_form_is_written_too(ran, tmp_path):
     """ZZR1 ... of the paper are base parameters of the links: bodies that have them are found."""
-    code, _, err = idbench("run", "ideal", "--no-rerun", "--out", "mine")
-    assert code == 0, err
-    code, _, err = idbench("identify", "mine/log.parquet", "--write-mjcf", "out.xml")
-    assert code == 0, err
+    ran("run ideal --no-rerun --out mine")
+    ran("identify mine/log.parquet --write-mjcf out.xml")
     made = standard_parameters(Robot.load(str(tmp_path / "out.xml")))
     assert made["ZZ1"] + made["Ia1"] + 0.25 * made["M2"] == pytest.approx(3.5, rel=1e-3)
     assert 0.5 * made["MX2"] == pytest.approx(0.12, rel=1e-2)
 
 
 @pytest.mark.thorough
-def test_a_file_without_motors_ranges_and_room_is_described_simulated_and_judged(idbench, arm):
-    code, out, err = idbench("robot", "arm.xml")
-    assert code == 0, err
-    assert "torque budget" in out
+def test_a_file_without_motors_ranges_and_room_is_described_simulated_and_judged(ran, arm):
+    assert "torque budget" in ran("robot arm.xml").out
     for name in ("first", "second"):
-        code, out, err = idbench("run", f"{name}.toml", "--robot", "arm.xml", "--out", name, "--no-rerun")
-        assert code == 0, err
+        out = ran(f"run {name}.toml --robot arm.xml --out {name} --no-rerun").out
         assert "has no motors (dcmotor elements of MJCF): its drives are ideal" in out
-    code, out, err = idbench("export", "first")
-    assert f"--robot {arm}" in out
-    words = "--validate", "second", "--write-mjcf", "out.xml", "--model", "explicit", "--out", "found", "--no-rerun"
-    code, out, err = idbench("identify", "first", *words)
-    assert code == 0, err
+    assert f"--robot {arm}" in ran("export first").out
+    words = "--validate second --write-mjcf out.xml --model explicit --out found --no-rerun"
+    out, _, summary = ran("identify first", words)
     assert out.startswith("Result: good (explicit model)")
-    summary = json.loads((arm.parent / "found" / "summary.json").read_text())
     assert max(summary["validation"]["models"]["explicit"]["position_error_rms"]) < 1e-3
 
 
 @pytest.mark.thorough
-def test_an_offset_is_no_error_of_the_simulated_robot(idbench, changed):
+def test_an_offset_is_no_error_of_the_simulated_robot(ran, changed):
     path = changed(tau=lambda tau: tau + [5, -8, 4, 1, -1, 0.5])
-    words = "identify", path, "--robot", "puma560", "--model", "explicit"
-    _, out, _ = idbench(*words)
-    assert "with --add offset the worst joint's error falls from" in out
-    code, out, err = idbench(*words, "--add", "offset", "--out", "found", "--no-rerun", "--write-mjcf", "out.xml")
-    assert code == 0, err
+    words = "identify", path, "--robot puma560 --model explicit"
+    assert "with --add offset the worst joint's error falls from" in ran(*words).out
+    out, _, summary = ran(*words, "--add offset --out found --no-rerun --write-mjcf out.xml")
     assert out.startswith("Result: good (explicit model)")
     assert "off1, off2, off3, off4, off5, off6 have no place in the file and are left out" in out
-    summary = json.loads((path.parent / "found" / "summary.json").read_text())
     assert max(summary["validation"]["models"]["explicit"]["position_error_rms"]) < 1e-3
 
 
 @pytest.mark.thorough
-def test_what_is_left_out_is_zero_in_the_file(idbench, logs, tmp_path):
-    words = "--robot", "puma560", "--model", "explicit", "--without", "Fs6", "--write-mjcf", "out.xml"
-    code, _, err = idbench("identify", logs / "first.parquet", *words)
-    assert code == 0, err
+def test_what_is_left_out_is_zero_in_the_file(idbench, ran, logs, tmp_path):
+    ran("identify", logs / "first.parquet", "--robot puma560 --model explicit --without Fs6 --write-mjcf out.xml")
     made = standard_parameters(Robot.load(str(tmp_path / "out.xml")))
     assert made["Fs6"] == pytest.approx(0, abs=1e-3)
     assert made["Fs5"] == pytest.approx(0.86, rel=0.02)
-    code, _, err = idbench("identify", logs / "first.parquet", "--robot", "scara", "--without", "ZZR1")
-    assert code == 2
+    assert idbench("identify", logs / "first.parquet", "--robot", "scara", "--without", "ZZR1")[0] == 2
 
 
 @pytest.mark.thorough
-def test_names_of_joints_survive_resampling_and_other_columns_do_not_matter(idbench, logs, tmp_path):
-    from pyarrow import csv, parquet
-
+def test_names_of_joints_survive_resampling_and_other_columns_do_not_matter(ran, logs, tmp_path):
     table = parquet.read_table(logs / "first.parquet").replace_schema_metadata({})
-    names = [name.replace("tau", "tau_joint").replace("q", "q_joint") for name in table.column_names]
-    csv.write_csv(table.rename_columns(names), tmp_path / "named.csv")
-    code, _, err = idbench("resample", "named.csv", "--fs", "200", "--out", "even.parquet", "--torque", "averaged")
-    assert code == 0, err
+    csv.write_csv(table.rename_columns(by_joint(table.column_names)), tmp_path / "named.csv")
+    ran("resample named.csv --fs 200 --out even.parquet --torque averaged")
     assert "tau_joint6" in parquet.read_table(tmp_path / "even.parquet").column_names
     csv.write_csv(table.append_column("q_wanted1", table["q1"]), tmp_path / "more.csv")
-    words = "--robot", "puma560", "--torque", "held", "--model", "explicit"
-    assert idbench("identify", "more.csv", *words)[0] == 0
+    ran("identify more.csv --robot puma560 --torque held --model explicit")

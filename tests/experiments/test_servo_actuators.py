@@ -48,19 +48,16 @@ def identified(*more):
     return json.loads(Path("out/summary.json").read_text())
 
 
-@pytest.fixture
-def leg(tmp_path, monkeypatch):
+@pytest.fixture(params=["implicitfast"])
+def leg(request, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for name, seed in (("a.csv", 1), ("b.csv", 2)):
-        log_of(tmp_path, name, seed)
+        log_of(tmp_path, name, seed, request.param)
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("integrator", ["Euler", "implicitfast"])
-def test_the_file_of_a_simulation_is_found_from_commands_and_positions(tmp_path, monkeypatch, integrator):
-    monkeypatch.chdir(tmp_path)
-    for name, seed in (("a.csv", 1), ("b.csv", 2)):
-        log_of(tmp_path, name, seed, integrator)
+@pytest.mark.parametrize("leg", ["Euler", "implicitfast"], indirect=True)
+def test_the_file_of_a_simulation_is_found_from_commands_and_positions(leg):
     found = identified("--simulated", "--find", "a", "--out", "out", "--write-mjcf", "found.xml")
     for joint, kp in (("hip", 40.0), ("knee", 30.0)):
         of = found["joints"][joint]

@@ -1,4 +1,4 @@
-"""The joints of an arm, one after the other, twice, and then their offsets."""
+"""The joints of an arm, one after the other, twice, and then their offsets; what is held of all, or of one."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -6,8 +6,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from idbench.experiments.cli.options.jobs import IdentifyServo
 from idbench.experiments.servo import joints as module
 from idbench.experiments.servo.identification import summary_of
+from idbench.experiments.servo.job import held_of
 from idbench.experiments.servo.joints import Joints, JointsLog
 from idbench.experiments.servo.servo_text import value_of
 from idbench.experiments.study.servo_rows import _joints
@@ -138,6 +140,11 @@ def test_offsets_are_what_gravity_says_of_all_joints_and_their_changes_what_anot
     )
     slope = per_offset(one, *(searched_runs(x, elbow.p["delay"]) for x in (now[2], shifted[2])))[place]
     assert again.p["offset"] - one.p["offset"] == pytest.approx(0.03 * slope, rel=0.2)
+
+
+def test_a_joint_has_what_is_held_for_it_before_what_is_held_for_all():
+    held = held_of(IdentifyServo(hold=("wrist.roll.a=0.7", "a=0.5", "Ia=0.02")), ["elbow", "wrist.roll"])
+    assert held == {"elbow": {"a": 0.5, "Ia": 0.02}, "wrist.roll": {"a": 0.7, "Ia": 0.02}}
 
 
 @pytest.mark.thorough

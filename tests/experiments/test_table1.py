@@ -6,7 +6,6 @@ import pytest
 from idbench.experiments.paper.table1 import PAPER, causes
 
 FORMS = ["explicit", "implicit", "power"]
-INERTIA = [0, 3, 4, 5]
 
 
 def errors(table1, chain, form, truth):

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from idbench.experiments.cli import main
 from idbench.experiments.identification.log_warnings import without_shapes
 from idbench.identify import BLOCKS, ExplicitModel, MotionLog, NoMask, Problem, TorqueChannel, idbench_chain, scara
 
@@ -20,13 +19,12 @@ from idbench.identify import BLOCKS, ExplicitModel, MotionLog, NoMask, Problem, 
         ({"damping": 1e3, "density": 1e3}, "are they in N m?"),
     ],
 )
-def test_what_of_the_file_differs_is_said(four_joints, tmp_path, capsys, factors, said):
+def test_what_of_the_file_differs_is_said(four_joints, tmp_path, ran, factors, said):
     text = (four_joints / "arm.xml").read_text()
     text = text.replace('damping="0.1"', f'damping="{0.1 * factors["damping"]:g}"')
     (tmp_path / "arm.xml").write_text(text.replace("<geom", f'<geom density="{1000 * factors["density"]:g}"'))
-    words = ["identify", str(four_joints / "log.csv"), "--robot", str(tmp_path / "arm.xml"), "--torque", "instantaneous"]
-    assert main([*words, "--model", "explicit", "--estimator", "WLS", "--no-rerun", "--out", str(tmp_path / "found")]) == 0
-    warnings = capsys.readouterr().out
+    words = "--robot arm.xml --torque instantaneous --model explicit --estimator WLS --no-rerun"
+    warnings = ran("identify", four_joints / "log.csv", words).out
     assert ("times what the robot's file says" in warnings) == (said is not None)
     assert said is None or said in warnings
 

@@ -8,7 +8,7 @@ from builders import forward
 
 from idbench.sim.errors import RobotError
 from idbench.sim.robot.inverse_dynamics import inverse_dynamics
-from idbench.sim.robot.mounting import Mounting
+from idbench.sim.robot.mounting import Mounting, locked
 from idbench.sim.robot.placed import numbers, without_rounding
 from idbench.sim.robot.rewrite import rewritten
 from idbench.sim.robot.robot import Robot

@@ -1,13 +1,15 @@
-"""Charts: what is drawn lies where its values are, between ticks that are round."""
+"""Charts: what is drawn lies where its values are, between ticks that are round; titles of plots, and what is said of logs."""
 
 import numpy as np
 import pytest
 from rerun.chunk import RrdReader
 
 from idbench.experiments.recording.chart import HEIGHT, WIDE, Chart
+from idbench.experiments.recording.columns import seconds
 from idbench.experiments.recording.scales import decades, linear, listed, named, signed
 from idbench.experiments.recording.stream import Stream
-from idbench.experiments.text import TICKS
+from idbench.experiments.recording.views import Shelf
+from idbench.experiments.text import TICKS, of_each
 
 
 @pytest.mark.parametrize(
@@ -91,3 +93,21 @@ def test_every_axis_has_two_values_at_least_and_has_room_for_them(rng):
         start = 10 ** rng.uniform(-8, 4)
         assert 2 <= len(decades("x", [start, start * 10 ** rng.uniform(0.02, 9)]).ticks) <= 8
         assert 2 <= len(signed("x", [10 ** rng.uniform(-3, 6)], bend=0.01).ticks) <= TICKS
+
+
+def test_titles_have_the_rms_of_what_was_sent_in_pieces():
+    """Of one curve sent in two pieces, and of two curves the largest."""
+    stream, t = Stream("sizes"), np.arange(4) / 100
+    for piece in (slice(0, 1), slice(1, 4)):
+        stream.curves("torque/log", [seconds(t[piece])], np.array([3.0, 3.0, -3.0, 3.0])[piece])
+    stream.curves("q/true", [seconds(t)], np.array([[1.0, 0.2]] * 4))
+    stream.keep_sizes()
+    shelf = Shelf(stream.paths)
+    assert shelf.rms(["torque/log"]) == ", rms 3"
+    assert shelf.rms(["q/true"]) == ", largest rms 1"
+    assert shelf.rms(["qd/true"]) == ""
+    assert shelf.paths == ["q/true", "torque/log"]
+
+
+def test_what_is_said_of_several_logs_is_one_line():
+    assert list(of_each([("a", "x"), ("b", "y"), ("c", "x")]).values()) == ["a, c: x", "b: y"]

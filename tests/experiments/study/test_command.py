@@ -171,25 +171,6 @@ def test_without_dask_workers_are_refused_and_the_rest_works(file, tmp_path, com
     assert "install the extra" in complaint("study", str(file), "--workers", "2", "--out", str(tmp_path / "out"))
 
 
-@pytest.mark.thorough
-def test_a_full_disk_is_one_line_and_keeps_what_there_is(file, tmp_path, complaint, monkeypatch):
-    out, real = tmp_path / "out", Store.write
-
-    def write(self, runs, shard):
-        if runs.start >= 9:
-            monkeypatch.setattr("pyarrow.parquet.write_table", full)
-        real(self, runs, shard)
-
-    def full(*args):
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(Store, "write", write)
-    assert "No space left on device; make room and go on with --resume" in complaint(
-        "study", str(file), "--out", str(out), "--threads", "1"
-    )
-    assert [path.name for path in Store.open(out).shards()] == ["runs-0000000000-0000000008.parquet"]
-
-
 def test_an_error_in_a_shard_is_not_taken_for_a_result(file, tmp_path, monkeypatch, capfd):
     """A mistake in the program is no reason in a row."""
     monkeypatch.setattr(engine, "run_shard", lambda *args, **kwargs: 1 / 0)

@@ -1,4 +1,8 @@
-"""Running a study: the same bits however it is cut, and runs that fail by themselves."""
+"""Running a study: the same bits however it is cut, stopped or killed, and runs that fail by themselves."""
+
+import os
+import signal
+import time
 
 import pytest
 from distributed import LocalCluster
@@ -7,7 +11,7 @@ from threadpoolctl import threadpool_info, threadpool_limits
 from idbench.experiments.errors import StudyError
 from idbench.experiments.study import cluster
 from idbench.experiments.study.cluster import cluster_pool, compute, versions
-from idbench.experiments.study.run_study import compare_again
+from idbench.experiments.study.run_study import compare_again, local_pool, run_missing
 from idbench.experiments.study.shard import run_shard
 from idbench.experiments.study.store import Store
 from idbench.experiments.study.study_file import study_from
@@ -122,3 +126,55 @@ def test_a_study_leaves_the_threads_of_the_libraries_as_they_were(small, tmp_pat
         before = [pool["num_threads"] for pool in threadpool_info()]
         run_study(small, tmp_path / "out")
         assert [pool["num_threads"] for pool in threadpool_info()] == before
+
+
+CODE = """
+import sys
+import time
+from pathlib import Path
+from idbench.experiments.study.run_study import local_pool, run_missing
+from idbench.experiments.study.store import Store
+store = Store.open(Path(sys.argv[1]))
+with local_pool(store.study, 2) as pool:
+    run_missing(store, pool, 2, lambda done: time.sleep(0.05))  # time for the kill, whatever else the machine does
+"""
+
+
+def finished(folder):
+    return {path.name: path.read_bytes() for path in (folder / "shards").glob("runs-*")}
+
+
+@pytest.mark.thorough
+def test_a_kill_loses_no_finished_shard(small, tmp_path, undisturbed, start):
+    """SIGKILL as soon as three shards are there; what was there stays as it was."""
+    with Store.new(small, tmp_path).held():
+        pass
+    process = start("-c", CODE, str(tmp_path))
+    while len(finished(tmp_path)) < 3:
+        assert process.poll() is None
+        time.sleep(0.001)
+    process.kill()
+    assert process.wait() == -signal.SIGKILL
+    kept = finished(tmp_path)
+    assert 3 <= len(kept) < 10
+    resumed = Store.open(tmp_path)
+    with local_pool(small, 2) as pool, resumed.held():
+        run_missing(resumed, pool, 64, lambda done: None)
+    assert kept.items() <= finished(tmp_path).items()
+    assert resumed.table().equals(undisturbed)
+
+
+@pytest.mark.thorough
+def test_a_killed_worker_costs_only_time(small, tmp_path, undisturbed):
+    """One of two workers is killed while shards are computed; it is replaced, and its shard is done again."""
+    store, killed = Store.new(small, tmp_path), []
+    with cluster_pool(small, None, 2) as pool, store.held():
+
+        def watch(done):
+            if done and not killed:
+                killed.append(next(iter(pool._client.run(os.getpid).values())))
+                os.kill(killed[0], signal.SIGKILL)
+
+        run_missing(store, pool, 2, watch)
+        assert killed[0] not in pool._client.run(os.getpid).values()
+    assert store.table().equals(undisturbed)

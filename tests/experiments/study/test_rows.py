@@ -1,9 +1,12 @@
-"""Studies that give every model as many rows, have ideal data, or settings that go together; and the ratios of errors."""
+"""Studies with as many rows for every model, ideal data, settings that go together, or a bound; and the ratios of errors."""
+
+import json
 
 import numpy as np
 import pytest
+import tomli_w
 
-from idbench.experiments.errors import StudyError
+from idbench.experiments.cli import main
 from idbench.experiments.study.axis import Axis
 from idbench.experiments.study.ratios import conclusion, ratio
 from idbench.experiments.study.shard import run_shard
@@ -12,6 +15,7 @@ from idbench.experiments.study.study_file import study_from
 from idbench.identify import MODELS, ExplicitModel, PowerModel, idbench_chain, identify, identify_each, scara
 from idbench.identify.models import THREE, OverWindows
 from idbench.identify.rows.operators import Windows
+from idbench.sim.encoders import AbstractEncoder, IncrementalEncoder
 from idbench.sim.errors import ScenarioError
 
 EVERY = ["explicit", "implicit", "power", "energy", "integral"]
@@ -127,23 +131,6 @@ def test_models_of_equal_rows_leave_out_the_same_time(content):
     assert len(set(found.values())) == 1
 
 
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"data": "ideal"}, "a scenario with encoder"),
-        ({"data": "ideal", "realizations": 2}, "ideal logs of a motion are all the same"),
-        ({"axes": [{"field": "model", "cases": {"a": {}, "b": {"fs": 50.0}}}]}, "column of the results"),
-        ({"axes": [{"field": "ZZR1", "cases": {"a": {}, "b": {"fs": 50.0}}}]}, "which is a parameter"),
-        ({"axes": [{"field": "", "values": [1]}]}, "field is empty"),
-        ({"axes": [{"field": "x", "cases": {"a": {"fs": 50.0}}}, {"field": "fs", "values": [50.0]}]}, "two axes vary fs"),
-        ({"axes": [{"field": "x", "cases": {"a": {"trajectory": {"seed": 5}}}}]}, "which a study draws itself"),
-    ],
-)
-def test_cases_and_ideal_data_are_checked(content, change, message):
-    with pytest.raises((StudyError, ScenarioError), match=message):
-        study_from({**content, **change}, "study")
-
-
 def test_a_case_is_not_changed_by_another_axis(content):
     """A study that is read again is the same, whatever its points were changed to."""
     cases = {"a": {"controller": {"kind": "computed_torque"}}, "b": {}}
@@ -161,3 +148,34 @@ def test_the_sentences_need_no_chain_or_estimator_of_their_own():
     assert conclusion([]) == ""
     assert "2 to 2 times" in conclusion([row | {"models": ["power", "explicit"]}])
     assert "no advantage" not in conclusion([row | {"models": ["implicit", "explicit"], "ratio": 0.3}])
+
+
+@pytest.mark.thorough
+def test_the_bound_stands_beside_the_errors(content, tmp_path, capsys):
+    """Of a study of nine runs: below the error of WLS, in the table, the summary and the report."""
+    content["settings"]["trajectory"]["moves"] = 6
+    axes = [{"field": "encoder.lines", "values": [2048]}]
+    path = tmp_path / "small.toml"
+    path.write_text(tomli_w.dumps(content | {"models": ["explicit"], "estimators": ["WLS"], "bound": True, "axes": axes}))
+    assert main(["study", str(path), "--out", str(tmp_path / "out"), "--no-rerun"]) == 0
+    assert "bound" in capsys.readouterr().out
+    (cell,) = json.loads((tmp_path / "out" / "summary.json").read_text())["cells"]
+    ratio = np.array(cell["rmse_percent"]) / cell["bound_percent"]
+    assert (ratio > 0.5).all()  # nine runs know an rms to a quarter
+    assert np.exp(np.mean(np.log(ratio))) > 1
+    assert (np.array(cell["bound_through_reversals_percent"]) < cell["bound_percent"]).all()
+    assert "<th>bound</th>" in (tmp_path / "out" / "report.html").read_text()
+
+
+def test_an_encoder_that_does_not_say_what_noise_it_has_is_named():
+    class Odd(AbstractEncoder):
+        def start(self, n, samples, fs, rngs):
+            raise NotImplementedError
+
+    with pytest.raises(ScenarioError, match=r"encoder Odd has no spread\(2\), which a study with bound = true needs"):
+        Odd().spread(2)
+
+
+def test_counts_noise_and_converter_add_up():
+    spread = IncrementalEncoder(lines=(1024, 4096), noise=1e-4).spread(2)
+    np.testing.assert_allclose(spread, np.hypot(2 * np.pi / np.array([4096, 16384]) / np.sqrt(12), 1e-4))

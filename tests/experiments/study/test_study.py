@@ -14,6 +14,10 @@ from idbench.experiments.study.study_file import load_study, names, study_from, 
 from idbench.identify import IirLowPass, NoMask
 from idbench.sim.drives import AveragedDrive
 
+LINES = {"field": "encoder.lines", "values": [2048]}
+RANDOM = {"kind": "random", "moves": 3}
+QUINTIC = {"kind": "quintic", "waypoints": [[0.0, 0.0], [1.0, 1.0]], "durations": [1.0], "rest": 0.5}
+
 
 def axes(content, *more, **first):
     """Return the study with the fields of its first axis changed, and more axes."""
@@ -73,14 +77,6 @@ def test_values_are_numbers_or_words_but_not_both(content):
     assert not noise.numeric
     assert [noise.label(x) for x in noise.points] == ["0.1", "[0.1, 0.01]"]
     assert Axis(field="x", values=[True, False]).numeric is False
-
-
-def test_every_combination_is_looked_at(content):
-    quintic = {"kind": "quintic", "waypoints": [[0.0, 0.0], [1.0, 1.0]], "durations": [1.0], "rest": 0.5}
-    random = content["settings"]["trajectory"]
-    study = study_from(axes(content, {"field": "trajectory", "values": [random, quintic]}), "study")
-    with pytest.raises(StudyError, match="needs a trajectory of kind random"):
-        _ = study.points
 
 
 def test_a_range_is_even(content):
