@@ -31,7 +31,7 @@ from idbench.experiments.servo.device import device_of
 from idbench.experiments.study import statistics
 from idbench.experiments.study.study_file import load_study
 from idbench.identify import CHAINS, ESTIMATORS
-from idbench.identify.basis.friction import smooth
+from idbench.identify.basis.friction import laws
 from idbench.identify.data import clock
 from idbench.identify.data.kinematics import INERTIAL
 from idbench.identify.estimators import leave_out
@@ -193,7 +193,7 @@ CLAIMS: list[tuple[str, str, Callable[[], object]]] = [
     ("first-hour.md", r"and (\w+) benches for servos", lambda: len(set(models.names()) & SCENARIO_ONLY)),
     ("first-hour.md", r"two joints, for (\d+) s", lambda: duration("ideal")),
     ("first-hour.md", r"# (\d+)-bit encoders", lambda: bits(load("quantization").encoder)),
-    ("friction.md", r"smooth function of each joint's velocity: (\d+) bumps", lambda: len(smooth.CENTRES)),
+    ("friction.md", r"smooth function of each joint's velocity: (\d+) bumps", lambda: len(laws.CENTRES)),
     ("friction.md", r"it explains (\d+) % of the squared error there", lambda: 100 * friction_choice.WORTH),
     ("friction.md", r"(\w+) stretches of the log are left out in turn", lambda: held_out.FOLDS),
     ("friction.md", r"there, and ([\d.]+) times its standard deviation", lambda: friction_choice.SURE),

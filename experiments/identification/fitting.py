@@ -22,7 +22,7 @@ from idbench.identify import (
     attempt_each,
 )
 from idbench.identify.data.motion_log import never_logged
-from idbench.identify.judge.diagnosis import diagnosed, silent_joint, still_joints, unlogged
+from idbench.identify.judge.diagnosis import diagnosed, silent_joint, still_joints, unlogged, unrelated_joint
 from idbench.identify.judge.mask_choice import suited_reach
 from idbench.identify.judge.stretches import held_out_errors
 from idbench.identify.judge.suspect import Suspect
@@ -98,6 +98,8 @@ def _silent(found: Fit) -> Suspect | None:
     problem, X = found.problem.explicit, found.estimates[found.leading].X
     if (suspect := silent_joint(problem, X)) is not None:
         return suspect
+    if (noise := unrelated_joint(problem)) is not None:
+        return unlogged(noise)
     for j in still_joints(problem):
         logs = found.logs.without_torque(j)
         quiet = _shown(found.request, logs, found.request.problem(logs.fitted))

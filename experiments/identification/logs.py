@@ -157,10 +157,11 @@ class Logs:
         return delayed, moved
 
     def without_torque(self, joint: int) -> "Logs":
-        """Return the logs without the torque of a joint, from 0, where it never changes: it was not logged there."""
+        """Return the logs without the torque of a joint, from 0, where it never changes; all, if it changes in all."""
+        still = any(joint in log.unchanging for log in self.fitted)
 
         def quiet(log: MotionLog) -> MotionLog:
-            return replace(log, missing=(*log.missing, joint)) if joint in log.unchanging else log
+            return replace(log, missing=(*log.missing, joint)) if joint in log.unchanging or not still else log
 
         held_out = self.held_out and {name: quiet(log) for name, log in self.held_out.items()}
         return replace(self, fitted=tuple(map(quiet, self.fitted)), held_out=held_out)

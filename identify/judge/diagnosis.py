@@ -22,7 +22,8 @@ parameters that count for that: those of a joint whose torque was not logged van
 DRIVING: tuple[Kind, ...] = ("viscous friction", "Coulomb friction")
 """Kinds of friction that are both negative where a torque has the other sign; one may be by a wrong delay."""
 
-UNRELATED = 0.9  # Share of a torque's squares that parameters of its own leave, from which on it does not follow the motion
+UNRELATED = 0.8  # Share of a torque's squares that parameters of its own leave, from which on it does not follow the motion
+ENOUGH = 4  # Rows a parameter from which on a torque is asked whether it follows the motion
 MOVES = 100.0  # Standard deviations of the noise of a position beyond which a joint moves, and does not flicker by a count
 SAMPLES = 20.0  # Samples for each period of the operator's cut-off with which large mistakes are looked for
 
@@ -41,7 +42,8 @@ def diagnosed(problem: Problem, X: Array) -> tuple[Suspect, ...]:
     small = small_mistakes(problem, X)
     whole = whole_mistakes(_thinned(problem.explicit), small[0] if small else None)
     if whole and small and (whole[0].cause, whole[0].joint) == (small[0].cause, small[0].joint):
-        return (whole[0], *small[1:])
+        there = {(each.cause, each.joint) for each in whole}
+        return (*whole, *(each for each in small if (each.cause, each.joint) not in there))
     return (*whole, *_besides(problem.explicit, whole)) if whole else (*_impossible_signs(problem.explicit, X), *small)
 
 
@@ -139,15 +141,23 @@ def unlogged(j: int) -> Suspect:
 
 
 def still_joints(problem: Problem) -> list[int]:
-    """Joints that move in a log in which their torque never changes, or does not follow the motion, as noise does not.
+    """Joints that move in a log in which their torque never changes."""
+    return sorted({j for log, own in zip(problem.logs, _moves(problem), strict=True) for j in log.unchanging if own[j]})
 
-    Of the latter even parameters of their own explain next to nothing.
-    """
-    least, factors = MOVES * problem.position_noise, problem.explicit.factors
-    moves = [np.max(np.ptp(log.q, axis=-2) > least, axis=tuple(range(log.q.ndim - 2))) for log in problem.logs]
-    never = {j for log, own in zip(problem.logs, moves, strict=True) for j in log.unchanging if own[j]}
-    for j in set(np.flatnonzero(np.all(moves, axis=0)).tolist()) - never:
+
+def _moves(problem: Problem) -> list[Array]:
+    """Whether each joint moves, log by log, shape (joint,)."""
+    least = MOVES * problem.position_noise
+    return [np.max(np.ptp(log.q, axis=-2) > least, axis=tuple(range(log.q.ndim - 2))) for log in problem.logs]
+
+
+def unrelated_joint(problem: Problem) -> int | None:
+    """The first moving joint whose torque even parameters of its own hardly explain, as of noise; None if there is none."""
+    factors, moves = problem.factors, np.all(_moves(problem), axis=0) & (not problem.logs[0].poses)
+    for j in np.setdiff1d(np.flatnonzero(moves), never_logged(problem.logs)):
         W, Y = factors.R[j, :, :-1], factors.R[j, :, -1]
-        if np.sum((Y - W @ np.linalg.lstsq(W, Y)[0]) ** 2) > UNRELATED * np.sum(Y**2):
-            never.add(j)
-    return sorted(never)
+        if factors.rows[j] > ENOUGH * len(problem.names) and np.sum(
+            (Y - W @ np.linalg.lstsq(W, Y)[0]) ** 2
+        ) > UNRELATED * np.sum(Y**2):
+            return int(j)
+    return None

@@ -150,9 +150,9 @@ def axis_turned(tree: KinematicTree, j: int, by: Array) -> KinematicTree:
 
 
 def rotation(v: Array) -> Array:
-    """Return the rotation by a small vector (Rodrigues)."""
+    """Return the rotation by a vector (Rodrigues)."""
     angle = float(np.linalg.norm(v))
-    K = np.cross(np.eye(3), v / angle)
+    K = np.cross(np.eye(3), v / (angle or 1.0))
     return np.asarray(np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * K @ K)
 
 

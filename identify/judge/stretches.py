@@ -38,7 +38,7 @@ def noise_errors(problem: Problem) -> Array:
     rows, explicit = problem.explicit.rows, problem.explicit
     variance = np.concatenate([part.noisy.variance(explicit.noise) for part in explicit.parts])
     squares, of_all = (np.sum(rows.by_kind(x * rows.valid), axis=-1) for x in (variance, rows.Y**2))
-    return np.asarray(100 * np.sqrt(squares / np.maximum(of_all, TINY)))
+    return np.asarray(100 * np.sqrt(np.maximum(squares, 0.0) / np.maximum(of_all, TINY)))
 
 
 def left_unexplained(before: Array, after: Array, noise: Array) -> Array:

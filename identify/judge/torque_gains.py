@@ -88,7 +88,7 @@ class TorqueGains:
         X, a = self.fitted
         size, C, each = np.log(np.maximum(np.abs(a), TINY)), self._covariance, np.arange(self.n)
         if self.scaled:
-            sigma, side = np.sqrt(np.diagonal(C)), 1.0
+            sigma, side = np.sqrt(np.maximum(np.diagonal(C), 0.0)), 1.0
             known = self.free & (sigma <= KNOWN)
             groups = [tuple(each[np.abs(size) <= np.maximum(SAME * sigma, NEAR)])]
         else:
@@ -116,7 +116,8 @@ class TorqueGains:
         X, a = self.fitted
         A = self._linear(X, a, self._weights(X, a))[0]
         A[:, len(X) :] *= a
-        size = np.maximum(np.linalg.norm(A, axis=0), TINY)
+        size = np.linalg.norm(A, axis=0)
+        size[size <= TINY] = 1.0
         A = (A / size).reshape(self.n, -1, A.shape[1])
         each = np.matmul(np.swapaxes(A, 1, 2), A)
         values, axes = np.linalg.eigh(each.sum(axis=0))

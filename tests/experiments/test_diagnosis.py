@@ -6,7 +6,7 @@ import pytest
 
 from idbench.experiments.identification.causes import WORDINGS
 from idbench.experiments.identification.friction_laws import FrictionLaws
-from idbench.identify.judge.mistakes import BASE, COLLISION, FROM_AN_INSTANT, OF_JOINTS, OF_ROBOT
+from idbench.identify.judge.mistakes import BASE, COGGING, COLLISION, COMMUTATION, FROM_AN_INSTANT, OF_JOINTS, OF_ROBOT
 
 
 def scaled(source, target, column, factor):
@@ -41,12 +41,14 @@ def test_a_wrong_torque_constant_is_named_and_the_option_mends_it(ran, tmp_path)
 
 
 def test_every_mistake_has_words():
-    small = {(m.cause, m.of) for m in (*OF_JOINTS, *OF_ROBOT, *FROM_AN_INSTANT, *BASE, COLLISION)}
+    small = {(m.cause, m.of) for m in (*OF_JOINTS, *OF_ROBOT, *FROM_AN_INSTANT, *BASE, COLLISION, COGGING, COMMUTATION)}
     large = {
         ("sign", "torque"),
         ("sign", "position"),
+        ("sign", "joint"),
         ("exchanged", "torque"),
         ("exchanged", "position"),
+        ("exchanged", "joint"),
         ("gravity", "base"),
         ("missing_torque", "torque"),
     }
