@@ -28,8 +28,32 @@ class Wording(NamedTuple):
 
 
 WORDINGS: Mapping[tuple[str, str], Wording] = {
-    ("gain", "torque"): Wording("torque constant {size} too {large}", "--gain {gains}"),
-    ("sign", "torque"): Wording("the torque has the other sign", "--gain {gains}"),
+    ("gain", "torque"): Wording("{of_gain}", "{gains}"),
+    ("sign", "torque"): Wording("the torque has the other sign", "{gains}"),
+    ("unit", "position"): Wording("positions are in degrees", "--units q=deg"),
+    ("unit", "joint"): Wording("its position is in degrees", by="convert its column to the unit of the others"),
+    **{
+        ("unknown", of): Wording(f"something else, {{size}} rms, {how}", by=by, law=law)
+        for of, how, by, law in (
+            ("velocity", "over its velocity", "compare laws of friction: --friction auto", ""),
+            (
+                "position",
+                "over its position",
+                "look at its residual over the position: a spring, a cable, a wave of its gear",
+                "",
+            ),
+            ("acceleration", "over its acceleration", "look at rotors and delays: --armature all, --torque-delay estimate", ""),
+            ("load", "over its load", "compare laws of friction: --friction auto", ""),
+            (
+                "other joints",
+                "over the motion of other joints",
+                "are torques mixed, as by a belt or a differential? --coupling",
+                "",
+            ),
+            ("moment", "for a moment of the log", "look at its residual over time, and cut that out", ""),
+        )
+    },
+    ("stated", "request"): Wording("{stated} contradicts the log", by="leave {stated} out, or correct it"),
     ("sign", "joint"): Wording(
         "position and torque have the other sign: its axis points the other way",
         by="turn the axis in the robot's file, or both signs in the log",
@@ -44,9 +68,7 @@ WORDINGS: Mapping[tuple[str, str], Wording] = {
     ),
     ("dead_band", "torque"): Wording("dead band of the torque, {size}", by="calibrate it"),
     ("delay", "torque"): Wording("torque acts {late} than the log says, by {size}, or lags", "--torque-delay {delay}"),
-    ("delay", "position"): Wording(
-        "position was measured {late} than the log says, by {size}, or lags", by="correct the delay of its position"
-    ),
+    ("delay", "position"): Wording("position is logged {size} {behind}, or lags", by="correct the delay of its position"),
     ("zero", "position"): Wording(
         "zero of the position off by {size}", by="subtract it from the joint's positions, or turn the link's frame in the file"
     ),
@@ -89,14 +111,12 @@ WORDINGS: Mapping[tuple[str, str], Wording] = {
         "clocks of positions and torques drift apart by {size}", by="log with one clock, or take a shorter log"
     ),
     ("exchanged", "torque"): Wording(
-        "its torque is exchanged with that of {other}", by="exchange their columns: --columns tau=..."
+        "its torque is exchanged with that of {other}", by="exchange the columns of its torque and that of {other}"
     ),
     ("exchanged", "position"): Wording(
-        "its position is exchanged with that of {other}", by="exchange their columns: --columns q=..."
+        "its position is exchanged with that of {other}", by="exchange the columns of its position and that of {other}"
     ),
-    ("exchanged", "joint"): Wording(
-        "its columns are exchanged with those of {other}", by="give the joints in the order of the columns: --joints {joints}"
-    ),
+    ("exchanged", "joint"): Wording("its columns are exchanged with those of {other}", "--joints {joints}"),
     ("missing_torque", "torque"): Wording(
         "its torque does not follow the motion: it was not logged, and its rows are left out", by="log it"
     ),
@@ -105,11 +125,15 @@ WORDINGS: Mapping[tuple[str, str], Wording] = {
 
 
 def causes_of(
-    suspects: Sequence[Suspect], robot_model: RobotModel, log: MotionLog, gains: Sequence[float] = ()
+    suspects: Sequence[Suspect], robot_model: RobotModel, log: MotionLog, gains: Sequence[float] = (), stated: str = ""
 ) -> tuple["Cause", ...]:
-    """Return mistakes as causes of a robot and its first log; one option mends all torques with the other sign."""
-    turned = tuple(s.joint for s in suspects if (s.cause, s.of) == ("sign", "torque") and s.joint is not None)
-    return tuple(Cause(each, robot_model, log, gains, turned) for each in suspects)
+    """Return mistakes as causes of a robot and its first log."""
+    return tuple(Cause(each, robot_model, log, gains, tuple(suspects), stated) for each in suspects)
+
+
+def remedy_of(causes: Sequence["Cause"]) -> str:
+    """The options that mend causes together; empty if none does."""
+    return " ".join(dict.fromkeys(cause.remedy for cause in causes if cause.remedy))
 
 
 def suspect_summary(suspect: Suspect, joints: Sequence[str], unit: str, remedy: str) -> dict[str, Any]:
@@ -135,6 +159,9 @@ def suspect_summary(suspect: Suspect, joints: Sequence[str], unit: str, remedy: 
     }
 
 
+LARGE, ABOUT = 6.0, 0.05
+"""Factor from which on a torque is said to be so many times too large, and the decades by which one of 1000 may be off."""
+
 LENGTHS = frozenset({"tilt", "axis", "eccentric", "cogging", "commutation", "base_motion"})
 """Causes of two sizes across each other, whose length is reported."""
 
@@ -151,8 +178,10 @@ class Cause:
     """The first log."""
     gains: Sequence[float] = ()
     """Gains with which it was read, of all joints or of each, where some were given."""
-    turned: tuple[int, ...] = ()
-    """Joints whose torque has the other sign: one option mends them all."""
+    every: tuple[Suspect, ...] = ()
+    """All mistakes that were found: one option mends all torques, another the friction of all joints."""
+    stated: str = ""
+    """The option by which something wrong was stated."""
 
     @property
     def joint(self) -> str | None:
@@ -175,15 +204,18 @@ class Cause:
 
     @property
     def remedy(self) -> str:
-        """The option that mends it; empty if none does."""
-        if self._wording.law and self.robot_model.laws.smooth:
+        """The option that mends it, beside others of its kind; empty if none does."""
+        values = self._values
+        if self._wording.law and not values["laws"]:
             return ""
-        return self._wording.mend.format(**self._values)
+        if self.suspect.cause == "coupled_rotor" and self.robot_model.tree.couplings:
+            return ""
+        return self._wording.mend.format(**values)
 
     @property
     def mends(self) -> str:
         """What mends it, an option or else."""
-        return self.remedy or self._wording.by or "take another law of friction"
+        return self.remedy or self._wording.by.format(**self._values) or "take another law of friction"
 
     @property
     def advice(self) -> str:
@@ -212,18 +244,47 @@ class Cause:
             return unit
         return unit.replace("N m", "N").replace("kg m^2", "kg").replace("rad", "m")
 
-    def _laws(self, law: str) -> str:
-        """Return words of friction with a law more, of the joint or of all."""
-        joints, j = self.robot_model.robot.joints, self.suspect.joint
-        laws = self.robot_model.laws
-        if not law or laws.smooth:
+    def _laws(self) -> str:
+        """Words of friction with the laws that causes are of, each at its joint or at all; empty where nothing is new."""
+        joints, laws = self.robot_model.robot.joints, self.robot_model.laws
+        if laws.smooth:
             return ""
-        more = [(law,) if j in (None, k) else () for k in range(len(joints))]
+        more = [list[str]() for _ in joints]
+        for each in self.every or (self.suspect,):
+            if law := WORDINGS[each.cause, each.of].law.format(setting=each.setting):
+                for k, found in enumerate(more):
+                    if each.joint in (None, k) and law not in (*laws.names[k], *found):
+                        found.append(law)
+        if not any(more):
+            return ""
         if len(set(laws.names)) > 1:
             return " ".join(laws.chosen(more, [()] * len(joints)).texts(joints))
-        own = "+".join(laws.names[0]).replace("viscous+coulomb", "standard") or "none"
-        together = f"{own}+{law}" if own != "none" else law
-        return together if j is None else f"{own} {said(j, joints)}={together}"
+        own = "+".join(laws.names[0]).replace("viscous+coulomb", "standard")
+        texts = ["+".join([*([own] if own else []), *found]) for found in more]
+        if len(set(texts)) == 1:
+            return texts[0]
+        return " ".join([own or "none", *(f"{said(j, joints)}={text}" for j, text in enumerate(texts) if more[j])])
+
+    def _gains(self) -> str:
+        """The option that mends all torques, in as many ways as the log cannot tell apart."""
+        n = len(self.robot_model.robot.joints)
+        given = np.asarray(self.gains if len(self.gains) else 1.0) * np.asarray(self.log.torque.gain)
+        ways = list(dict.fromkeys(each.gains for each in self.every if each.gains)) or [((1.0,) * n,)]
+        mended = np.prod([way[0] for way in ways], axis=0)
+        each = [mended] if len(ways) > 1 else [np.array(way) for way in ways[0]]
+        for small in (s for s in self.every if s.cause == "gain" and not s.gains and s.joint is not None):
+            each = [x * np.where(np.arange(n) == small.joint, 1 / (1 + small.size[0]), 1.0) for x in each]
+        return " or ".join(f"--gain {' '.join(f'{x:.4g}' for x in given * gains)}" for gains in each)
+
+    def _of_gain(self, size: str) -> str:
+        """A wrong gain in words: in per cent, or as a factor where that is large."""
+        factor = 1 + self.suspect.size[0]
+        if 1 / LARGE < factor < LARGE:
+            return f"torque constant {size} too {'large' if factor > 1 else 'small'}"
+        unit = (
+            ", as in mN m" if abs(np.log10(factor) - 3) < ABOUT else ", as in kN m" if abs(np.log10(factor) + 3) < ABOUT else ""
+        )
+        return f"torque {factor:.4g} times too large{unit}"
 
     @property
     def _values(self) -> dict[str, Any]:
@@ -236,28 +297,30 @@ class Cause:
             if s.unit == of:
                 size, sigma = scale * size, scale * sigma
                 unit = f" {shown}"
-        if any(word in self._wording.what for word in ("{large}", "{late}", "{faster}")):
+        if any(word in self._wording.what for word in ("{of_gain}", "{large}", "{late}", "{behind}", "{faster}")):
             size = abs(size)
         j = s.joint or 0
-        given = np.asarray(self.gains if len(self.gains) else 1.0) * np.asarray(self.log.torque.gain)
-        gains = np.broadcast_to(given, (len(joints),)).copy()
-        gains[list(self.turned) if s.cause == "sign" else j] *= (
-            -1.0 if s.cause == "sign" else 1 / (1 + s.size[0]) if s.cause == "gain" else 1.0
-        )
-        last = min(j + 1, len(joints) - 1)
+        last, other = min(j + 1, len(joints) - 1), int(s.size[0]) - 1 if s.cause == "exchanged" else j
+        order = list(joints)
+        order[j], order[other] = order[other], order[j]
+        shown = f"{concise(size, sigma)}{unit}" if sigma else f"{size:.3g}{unit}"
         return {
-            "size": f"{concise(size, sigma)}{unit}" if sigma else f"{size:.3g}{unit}",
+            "size": shown,
+            "of_gain": self._of_gain(shown) if s.cause == "gain" else "",
+            "stated": self.stated,
             "instant": "" if s.instant is None else f"{s.instant:.1f} s{'' if s.log is None else f' of log {s.log + 1}'}",
             "large": "large" if s.size[0] > 0 else "small",
             "late": "earlier" if s.size[0] > 0 else "later",
+            "behind": "late" if s.size[0] > 0 else "early",
             "faster": "faster" if s.size[0] > 0 else "slower",
             "axis": "xyz"[int(s.setting)] if s.cause == "length" else "",
-            "laws": self._laws(self._wording.law.format(setting=s.setting)),
-            "gains": " ".join(f"{x:.4g}" for x in gains),
+            "laws": self._laws(),
+            "gains": self._gains(),
             "delay": "joints" if s.joint is not None else "estimate",
             "coupling": f"motor{last + 1}={joints[j]}+{joints[last]}",
             "gravity": " ".join(f"{x:.3g}" for x in self._gravity()),
-            "other": joints[int(s.size[0]) - 1] if s.cause == "exchanged" else "",
+            "other": joints[other],
+            "joints": " ".join(order),
             "setting": s.setting,
         }
 
@@ -274,6 +337,8 @@ class Cause:
 
     def _named(self, other: tuple[str, int | None]) -> str:
         cause, j = other
+        if cause == "stated":
+            return f"{self.stated} contradicts the log"
         return cause.replace("_", " ") if j is None else f"{cause.replace('_', ' ')} of {self.robot_model.robot.joints[j]}"
 
 

@@ -11,6 +11,7 @@ from idbench.experiments.identification.logs import Logs
 from idbench.experiments.identification.rates import CONTROLLER, Rates
 from idbench.experiments.identification.request import Request
 from idbench.experiments.identification.robot_model import RobotModel
+from idbench.experiments.identification.stated import contradicted
 from idbench.experiments.results.writing import finite, summarize
 from idbench.identify import (
     Array,
@@ -24,11 +25,13 @@ from idbench.identify import (
 from idbench.identify.arrays import TINY
 from idbench.identify.judge.diagnosis import diagnosed
 from idbench.identify.judge.friction_choice import FrictionChoice
+from idbench.identify.judge.motion_share import MotionShare, motion_shares, something_else
 from idbench.identify.judge.suspect import Suspect
 from idbench.identify.judge.torque_interval import TorqueInterval, torque_interval
 from idbench.identify.rows.rows import Rows
 from idbench.identify.signals.masks import slow_speed
 
+ALIKE = 1.1  # Factor between held-out errors up to which one cause explains as much as another
 NOTHING = 1e-12  # Share of a torque's squares below which its variance is rounding
 
 
@@ -71,10 +74,34 @@ class Fit:
         """What is wrong, as residuals show it; None where the rows do not allow the tests."""
         try:
             suspects = diagnosed(self.problem, self.estimates[self.leading].X)
+            wrong = contradicted(self.request, self.problem, self.logs.fitted)
         except (IdentificationError, np.linalg.LinAlgError):  # an estimate is not lost because its tests are
             return None
-        log, gains = self.logs.fitted[0], self.logs.gains
-        return causes_of((*self.silent, *suspects), self.robot_model, log, gains)
+        # Wrong gains, and something held that is wrong by the same factor, explain the same.
+        if wrong and suspects and suspects[0].gains and suspects[0].held_out[1] <= ALIKE * wrong[0].held_out[1]:
+            other = ("stated", None)
+            suspects = tuple(replace(each, alternatives=(*each.alternatives, other)) for each in suspects)
+        elif wrong:
+            suspects = (wrong[0],)
+        elif not suspects:
+            suspects = tuple(something_else(self.motion_shares))
+        log, gains, stated = self.logs.fitted[0], self.logs.gains, wrong[1] if wrong else ""
+        return causes_of((*self.silent, *suspects), self.robot_model, log, gains, stated)
+
+    @cached_property
+    def motion_shares(self) -> list[MotionShare]:
+        """What functions of the motion predict of each joint's residual; none of poses, nor where rows are not kept."""
+        explicit = self.problem.explicit
+        if self.problem.long or self.logs.fitted[0].poses or explicit.rows.Y.ndim > 1:
+            return []
+        return motion_shares(explicit, self.estimates[self.leading].X)
+
+    @property
+    def noise_of_rows(self) -> Array | None:
+        """Rms of what nothing of the motion predicts, of poses the noise of their torques, shape (joint,) [N m]; or None."""
+        if self.logs.fitted[0].poses:
+            return self.estimates[self.leading].noise_levels.torque
+        return np.array([each.noise for each in self.motion_shares]) if self.motion_shares else None
 
     @property
     def masked_speeds(self) -> Array:

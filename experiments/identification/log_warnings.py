@@ -72,6 +72,8 @@ MOST_TURNS = 2.0
 
 HARDLY = 0.02  # Share of its range below which a joint hardly moves
 MOST_JUMPS = 3  # Jumps of a log that are named
+DROPOUTS = 5  # Jumps of a log from which on samples are missing: an encoder slips once
+JUMPS = "jumps"  # What some warnings of logs are about
 STILL = 1e-3  # A joint that travels less than this share of what the busiest does is at rest, and trembles
 
 
@@ -104,6 +106,14 @@ def jumps_of(log: MotionLog) -> list[Jump]:
 def _of_jumps(log: MotionLog, tree: KinematicTree) -> Iterator[str]:
     """Yield the first jumps of a log, by joint, sample and speed."""
     every = jumps_of(log)
+    if len(every) >= DROPOUTS:
+        first, k = tree.joints[every[0].joint].name, every[0].sample
+        yield Note(
+            f"{len(every)} jumps, the first of {first} at sample {k} ({k / log.fs:.4g} s): samples were dropped, "
+            "held or repeated; log without dropouts, or identify a part that has none; no further advice before",
+            about=JUMPS,
+        )
+        return
     for jump in every[:MOST_JUMPS]:
         slide = tree.joints[jump.joint].kind == "slide"
         unit, k = "m" if slide else "rad", jump.sample
@@ -112,9 +122,10 @@ def _of_jumps(log: MotionLog, tree: KinematicTree) -> Iterator[str]:
             if jump.back
             else f"and stays there: did its encoder slip, or was it homed anew? Identify samples 0 to {k - 1}, or those after"
         )
-        yield (
+        yield Note(
             f"{tree.joints[jump.joint].name} jumps by {jump.size:.3g} {unit} at sample {k} ({k / log.fs:.4g} s), "
-            f"{jump.speed:.3g} {unit}/s where 99 % of the log is slower than {jump.usual:.3g}, {how}"
+            f"{jump.speed:.3g} {unit}/s where 99 % of the log is slower than {jump.usual:.3g}, {how}",
+            about=JUMPS,
         )
     if len(every) > MOST_JUMPS:
         yield f"and {len(every) - MOST_JUMPS} more such jumps"

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from idbench.experiments.identification.causes import Cause
+from idbench.experiments.identification.causes import Cause, remedy_of
+from idbench.experiments.identification.log_warnings import JUMPS
 from idbench.experiments.identification.robot_model import ASSUMED
 from idbench.experiments.judgement.held_out import FAIR, GOOD
 from idbench.experiments.judgement.judgement import Judgement
@@ -32,15 +33,17 @@ class Conclusion:
 def conclusion(judgement: Judgement, warnings: Mapping[str, Sequence[str]]) -> Conclusion:
     """The answer on the hardest held-out log.
 
-    What is wrong with the log, and has an option that mends it, comes before mistakes of the model: it may cause them.
+    Jumps of the log come before mistakes, which they cause; other doubts about it only where no mistake is proved.
     """
     verdict = judgement.verdict
     word = verdict.word if verdict else ""
-    of_log = next((warning for warning in warnings.get(LOG, ()) if noted(warning).option), "")
+    proved = any(any(cause.suspect.held_out) for cause in judgement.fit.diagnosis or ())
+    doubts = map(noted, warnings.get(LOG, ()))
+    of_log = next((str(doubt) for doubt in doubts if doubt.about == JUMPS or (doubt.option and not proved)), "")
     first = next((found[0] for found in warnings.values() if found), "")
     late = next((option for warning in warnings.get(DELAY, ()) if (option := noted(warning).option)), "")
     causes = judgement.fit.diagnosis or ()
-    if late and causes and causes[0].suspect.cause == "delay":
+    if late and causes and (causes[0].suspect.cause, causes[0].suspect.of) == ("delay", "torque"):
         return Conclusion(word, _finding(judgement, causes), late)
     step = _next(judgement, of_log, first)
     if word == "poor" and judgement.fit.robot_model.assumed:
@@ -68,8 +71,8 @@ def _next(judgement: Judgement, of_log: str, first: str) -> str:
     """Next step: about the log, then the proved remedy of the first mistake, else the first doubt."""
     if of_log:
         return of_log
-    for cause in judgement.fit.diagnosis or ():
-        return cause.mends
+    if causes := judgement.fit.diagnosis:
+        return remedy_of(causes) if causes[0].remedy else causes[0].mends
     if first:
         return first
     if judgement.good:

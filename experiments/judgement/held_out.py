@@ -164,10 +164,8 @@ class HeldOut:
     @cached_property
     def torques(self) -> dict[str, Validation]:
         """How well each model predicts the torques."""
-        return {
-            model: validate(self.problem, e.X, e.within_covariance, e.noise_levels.torque)
-            for model, e in self.fit.estimates.items()
-        }
+        noise = self.fit.noise_of_rows
+        return {model: validate(self.problem, e.X, e.within_covariance, noise) for model, e in self.fit.estimates.items()}
 
     def within_interval(self, model: str) -> tuple[Array, float] | None:
         """Return the share of each joint's torques within the fit's intervals, and that of the log outside the fit."""

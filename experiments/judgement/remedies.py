@@ -180,7 +180,7 @@ def warnings_of_logs(judgement: Judgement) -> list[str]:
     every += [(f"{name}: ", log) for name, log in (logs.held_out or {}).items()]
     untested = judgement.fit.diagnosis is None
     return [
-        Note(before + warning, option=noted(warning).option)
+        Note(before + warning, option=noted(warning).option, about=noted(warning).about)
         for before, log in every
         for warning in (*warnings_of_log(log, tree), *(unchanging(log, tree) if untested else ()))
     ]

@@ -111,7 +111,8 @@ class LoadJudgement:
             suspects = diagnosed(found.problem, found.X)
         except (IdentificationError, np.linalg.LinAlgError):
             return ()
-        return causes_of(suspects, robot_model, found.problem.logs[0], self.gain.tolist())
+        log = found.problem.logs[0]  # whose gain is in that of its file
+        return causes_of(suspects, robot_model, log, (self.gain / np.asarray(log.torque.gain)).tolist())
 
     @cached_property
     def verdicts(self) -> dict[str, Verdict]:

@@ -101,7 +101,8 @@ def validate(held_out: Problem, X: Array, covariance: Array | None = None, noise
     covariance : Array, shape (p, p), optional
         Theirs.
     noise : Array, shape (joint,), optional
-        Of the torques of poses at rest [N m], which do not show their noise themselves.
+        Of the torques of poses at rest [N m], which do not show their noise themselves; of a motion the rms of what no function
+        of it predicts in the rows of the fit, where that is more than what lies above their band: noise of low frequency.
 
     Raises
     ------
@@ -134,10 +135,9 @@ def validate(held_out: Problem, X: Array, covariance: Array | None = None, noise
             "no joint moves in this log, as far as the mask of the chain sees: use another motion, or a lower --mask-speed"
         )
     bound = _bound(chain.operator, signals.fs) / np.sqrt(np.maximum(count, 1))
-    if not signals.log.poses:
-        noise = row_noise(left, signals, chain) * [joint.unmasked for joint in moving]
-    elif noise is None:
-        noise = np.full(basis.n, np.nan)
+    given = np.full(basis.n, np.nan) if noise is None else noise
+    white = given if signals.log.poses else row_noise(left, signals, chain) * [joint.unmasked for joint in moving]
+    noise = np.fmax(white, given)
     noise = np.where(np.isfinite(rms), noise, np.nan)
     left_open = [joint.open(covariance) for joint in moving]
     still_rms = np.sqrt(np.divide(squares, count_still, out=np.full(basis.n, np.nan), where=count_still > 0))

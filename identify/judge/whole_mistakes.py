@@ -38,6 +38,7 @@ NOTHING_LEFT = 1 / 9
 mistakes."""
 
 GRAVITY = 9.81  # [m/s^2]
+DEGREE = np.pi / 180  # [rad]
 TURNS, SETTLED = 8, 1.0  # Steps of its direction at most, and what each must take of the misfit
 LARGEST_TURN = 0.7  # [rad] in one of them: half of the way from one axis to the next
 ALMOST_NONE = 1e-3  # Share of gravity in torques that are without it: so little that parameters stay apart
@@ -128,6 +129,7 @@ def _likely(problem: Problem) -> Iterator[_Tried]:
 
 
 def _others(problem: Problem) -> Iterator[_Tried]:
+    yield from _in_degrees(problem)
     yield from _across(problem)
     yield from _exchanged(problem)
     yield from _turned(problem)
@@ -252,6 +254,16 @@ def _with_gravity(problem: Problem, basis: Basis, gravity: Array) -> _Tried:
 def turned_position(problem: Problem, j: int) -> Problem:
     """The problem with the other sign of a position."""
     return _changed(problem, q=_diagonal(problem.basis.n, j))
+
+
+def _in_degrees(problem: Problem) -> Iterator[_Tried]:
+    """Yield positions of hinges that are in degrees: of all, or of one."""
+    n = problem.basis.n
+    hinges = np.array([j not in problem.basis.slides for j in range(n)])
+    yield _Tried("unit", "position", None, (DEGREE,), _changed(problem, q=np.diag(np.where(hinges, DEGREE, 1.0))))
+    for j in np.flatnonzero(hinges) if n > 1 else ():
+        one = np.diag(np.where(np.arange(n) == j, DEGREE, 1.0))
+        yield _Tried("unit", "joint", int(j), (DEGREE,), _changed(problem, q=one))
 
 
 def _turned(problem: Problem) -> Iterator[_Tried]:
