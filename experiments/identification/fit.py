@@ -27,11 +27,12 @@ from idbench.identify.judge.diagnosis import diagnosed
 from idbench.identify.judge.friction_choice import FrictionChoice
 from idbench.identify.judge.motion_share import MotionShare, motion_shares, something_else
 from idbench.identify.judge.suspect import Suspect
+from idbench.identify.judge.torque_gains import TorqueGains
 from idbench.identify.judge.torque_interval import TorqueInterval, torque_interval
 from idbench.identify.rows.rows import Rows
 from idbench.identify.signals.masks import slow_speed
 
-ALIKE = 1.1  # Factor between held-out errors up to which one cause explains as much as another
+ALIKE = 2.0  # Factor between held-out errors up to which one cause explains as much as another
 NOTHING = 1e-12  # Share of a torque's squares below which its variance is rounding
 
 
@@ -95,6 +96,12 @@ class Fit:
         if self.problem.long or self.logs.fitted[0].poses or explicit.rows.Y.ndim > 1:
             return []
         return motion_shares(explicit, self.estimates[self.leading].X)
+
+    @cached_property
+    def hidden_gains(self) -> Array | None:
+        """Errors of torque constants that these logs would not show, shape (joint,); None where rows are not kept."""
+        explicit = self.problem.explicit
+        return None if self.problem.long or explicit.rows.Y.ndim > 1 else TorqueGains.of(explicit).hidden
 
     @property
     def noise_of_rows(self) -> Array | None:
@@ -242,6 +249,7 @@ class Fit:
             "diagnosis": [cause.summary() for cause in self.diagnosis or ()],
             "models": models,
             "failures": self.failures,
+            "hidden_gain_errors": None if self.hidden_gains is None else [finite(x) for x in self.hidden_gains],
             "hidden": list(self.hidden),
             "mask_speed": list(self.request.mask_speed),
             "mask_reach": list(self.request.mask_reach),

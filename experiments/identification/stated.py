@@ -42,12 +42,17 @@ def contradicted(request: Request, problem: Problem, logs: tuple[MotionLog, ...]
 
 def _fewer(asked: Parameters) -> Iterator[tuple[str, Parameters]]:
     """Yield options that state parameters, word by word and then whole, with what is asked for without them."""
-    for name, words, of in (
-        ("--hold", asked.hold, lambda some: replace(asked, hold=some)),
-        ("--tie", asked.tie, lambda some: replace(asked, tie=some)),
-        ("--prior", asked.prior, lambda some: replace(asked, prior=some)),
-    ):
-        for word in words if len(words) > 1 else ():
-            yield f"{name} {word}", of(tuple(x for x in words if x != word))
-        if words:
-            yield f"{name} {' '.join(words)}", of(())
+    stated = {
+        "--hold": [(word, replace(asked, hold=_except(asked.hold, word))) for word in (*asked.hold, *_whole(asked.hold))],
+        "--tie": [(word, replace(asked, tie=_except(asked.tie, word))) for word in (*asked.tie, *_whole(asked.tie))],
+        "--prior": [(word, replace(asked, prior=_except(asked.prior, word))) for word in (*asked.prior, *_whole(asked.prior))],
+    }
+    yield from ((f"{option} {word}", without) for option, words in stated.items() for word, without in words)
+
+
+def _whole(words: tuple[str, ...]) -> tuple[str, ...]:
+    return (" ".join(words),) if len(words) > 1 else ()
+
+
+def _except(words: tuple[str, ...], word: str) -> tuple[str, ...]:
+    return tuple(each for each in words if each != word) if word in words else ()

@@ -1,18 +1,21 @@
 """What a judged identification comes to: one sentence, and the next step."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from idbench.experiments.identification.causes import Cause, remedy_of
-from idbench.experiments.identification.log_warnings import JUMPS
+from idbench.experiments.identification.fit import Fit
+from idbench.experiments.identification.log_warnings import JUMPS, resting
 from idbench.experiments.identification.robot_model import ASSUMED
 from idbench.experiments.judgement.held_out import FAIR, GOOD
 from idbench.experiments.judgement.judgement import Judgement
-from idbench.experiments.judgement.warnings import DELAY, LOG
+from idbench.experiments.judgement.warnings import DELAY, LOG, MODEL
 from idbench.experiments.note import noted
 from idbench.experiments.text import error_percentage
+
+WEAK = 0.1  # Error of a torque constant from which on a log that would not show it is weak
 
 
 @dataclass(frozen=True)
@@ -39,13 +42,11 @@ def conclusion(judgement: Judgement, warnings: Mapping[str, Sequence[str]]) -> C
     word = verdict.word if verdict else ""
     proved = any(any(cause.suspect.held_out) for cause in judgement.fit.diagnosis or ())
     doubts = map(noted, warnings.get(LOG, ()))
-    of_log = next((str(doubt) for doubt in doubts if doubt.about == JUMPS or (doubt.option and not proved)), "")
-    first = next((found[0] for found in warnings.values() if found), "")
-    late = next((option for warning in warnings.get(DELAY, ()) if (option := noted(warning).option)), "")
+    of_log = next(
+        (str(doubt) for doubt in doubts if doubt.about == JUMPS or (doubt.option and not proved and word != "good")), ""
+    )
     causes = judgement.fit.diagnosis or ()
-    if late and causes and (causes[0].suspect.cause, causes[0].suspect.of) == ("delay", "torque"):
-        return Conclusion(word, _finding(judgement, causes), late)
-    step = _next(judgement, of_log, first)
+    step = of_log or _next(judgement, warnings)
     if word == "poor" and judgement.fit.robot_model.assumed:
         step = f"{ASSUMED}: --robot FILE names another"
     return Conclusion(word, _finding(judgement, [] if of_log else causes), step)
@@ -64,19 +65,37 @@ def _finding(judgement: Judgement, causes: Sequence[Cause]) -> str:
     noisy = f", {error_percentage(beyond)} beyond noise and sigma," if beyond < most < worst else ""
     off = f"torque errors of at most {error_percentage(worst)}{noisy}"
     found = f"Result: {verdict.word} ({model} model), {off} on {one.title.finding}"
-    return "; ".join([found, *(cause.words for cause in causes[:1])])
+    seen = _power(judgement.fit) if verdict.word == "good" and not causes else []
+    return "; ".join([found, *(cause.words for cause in causes[:1]), *seen])
 
 
-def _next(judgement: Judgement, of_log: str, first: str) -> str:
-    """Next step: about the log, then the proved remedy of the first mistake, else the first doubt."""
-    if of_log:
-        return of_log
+def _power(fit: Fit) -> Iterator[str]:
+    """Yield what a good result would have seen, and of which joints nothing is known."""
+    joints = fit.robot_model.robot.joints
+    if still := [joint for joint in joints if all(joint in resting(log, fit.robot_model.tree) for log in fit.logs.fitted)]:
+        yield f"nothing is known of {', '.join(still)}: no motion"
+    if fit.hidden_gains is not None:
+        some = [(x, joint) for x, joint in zip(fit.hidden_gains, joints, strict=True) if joint not in still]
+        worst, joint = max(some)
+        if not np.isfinite(worst):
+            yield f"it cannot see a wrong torque constant of {joint}"
+        elif worst > WEAK:
+            yield f"it would not see a torque constant of {joint} that is {error_percentage(100 * worst)} off"
+        else:
+            yield f"sees torque constants that are {error_percentage(100 * worst)} off"
+
+
+def _next(judgement: Judgement, warnings: Mapping[str, Sequence[str]]) -> str:
+    """Next step: what mends the first mistake, beside others; else an option that was proved; else the first doubt."""
     if causes := judgement.fit.diagnosis:
         return remedy_of(causes) if causes[0].remedy else causes[0].mends
-    if first:
-        return first
+    of_delay_and_model = (*warnings.get(DELAY, ()), *warnings.get(MODEL, ()))
+    if proved := next((warning for warning in of_delay_and_model if noted(warning).option), ""):
+        return proved
     if judgement.good:
         return "--write arm.urdf arm.json arm.py keeps the robot"
+    if first := next((found[0] for found in warnings.values() if found), ""):
+        return first
     if judgement.fit.logs.fitted[0].poses:
         return "more poses"
     asked = judgement.fit.request.robot_model.asked.friction

@@ -23,6 +23,7 @@ DRIVING: tuple[Kind, ...] = ("viscous friction", "Coulomb friction")
 """Kinds of friction that are both negative where a torque has the other sign; one may be by a wrong delay."""
 
 UNRELATED = 0.8  # Share of a torque's squares that parameters of its own leave, from which on it does not follow the motion
+SMOOTH = 0.5  # Correlation of a torque from row to row from which on it follows some motion: that of noise is 0.2
 ENOUGH = 4  # Rows a parameter from which on a torque is asked whether it follows the motion
 MOVES = 100.0  # Standard deviations of the noise of a position beyond which a joint moves, and does not flicker by a count
 SAMPLES = 20.0  # Samples for each period of the operator's cut-off with which large mistakes are looked for
@@ -154,10 +155,11 @@ def _moves(problem: Problem) -> list[Array]:
 def unrelated_joint(problem: Problem) -> int | None:
     """The first moving joint whose torque even parameters of its own hardly explain, as of noise; None if there is none."""
     factors, moves = problem.factors, np.all(_moves(problem), axis=0) & (not problem.logs[0].poses)
+    every = problem.rows.by_kind(problem.rows.Y * problem.rows.valid)
     for j in np.setdiff1d(np.flatnonzero(moves), never_logged(problem.logs)):
-        W, Y = factors.R[j, :, :-1], factors.R[j, :, -1]
-        if factors.rows[j] > ENOUGH * len(problem.names) and np.sum(
-            (Y - W @ np.linalg.lstsq(W, Y)[0]) ** 2
-        ) > UNRELATED * np.sum(Y**2):
+        W, Y, y = factors.R[j, :, :-1], factors.R[j, :, -1], every[j]
+        if factors.rows[j] <= ENOUGH * len(problem.names) or y[1:] @ y[:-1] > SMOOTH * (y @ y):
+            continue
+        if np.sum((Y - W @ np.linalg.lstsq(W, Y)[0]) ** 2) > UNRELATED * np.sum(Y**2):
             return int(j)
     return None

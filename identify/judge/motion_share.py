@@ -20,7 +20,7 @@ PEAK = 0.4
 
 
 WORTH_A_WORD = 2.0  # Error [% of the torque] from which on something that no mistake explains is named
-FAINT = 0.1  # Share below which functions predict nothing: of 12 bits and coloured noise they predict up to 0.12
+FAINT = 0.15  # Share below which functions predict nothing: of 12 bits and coloured noise they predict up to 0.12
 
 
 class MotionShare(NamedTuple):

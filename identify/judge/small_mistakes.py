@@ -29,7 +29,9 @@ WORTH, MATTERS = 0.98, 0.02
 """Share of an error on stretches that were not fitted that a mistake may leave, and error [%] below which none matters: a chain
 has errors of its own, of some 1e-5 %, and no drive is known to a fiftieth of a per cent."""
 
-PROOF = 0.25  # Share of squared held-out errors beyond noise, at the joint where they fall most, that a named mistake may leave
+PROOF, MOSTLY, LEFT = 0.5, 1 / 9, 10.0
+"""Share of squared held-out errors beyond noise, at the joint where they fall most, that a named mistake may leave; and that
+which it may leave if the error is still above so many per cent of the torque, as something else is wrong, too."""
 PUSHED = 0.02  # Torque of a push, over the rms of the joint's, above which it is one: less is what any model leaves somewhere
 ALIKE = 0.8  # Share of what a mistake explains that another one must explain to be its alternative
 NEARLY_ALL = 0.95  # Share of what the most likely one takes from which on a more common one is named before it
@@ -117,8 +119,9 @@ class _Search:
         for k, candidate in enumerate(taken):
             before = self._held_out([*taken[:k], *taken[k + 1 :]])
             j = int(np.argmax(np.log(before) - np.log(after)))
+            share = float(left_unexplained(before, after, noise)[j])
             once = candidate.mistake is COLLISION  # which nothing predicts that happened before or after
-            shares.append(0.0 if once else float(left_unexplained(before, after, noise)[j]))
+            shares.append(0.0 if once else share if share <= MOSTLY or after[j] <= LEFT else 1.0)
         worst = int(np.argmax(shares))
         if shares[worst] <= PROOF:
             return list(found)

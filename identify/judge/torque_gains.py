@@ -111,6 +111,24 @@ class TorqueGains:
         return made.fitted[1]
 
     @cached_property
+    def hidden(self) -> Array:
+        """Error of each torque's gain up to which the log would not show it, if only that were wrong, shape (joint,); or inf.
+
+            sqrt(DECISIVE) sigma,   1 / sigma^2 = c' (I - W W^+) c / r,   c_j = W_j X + h_j over the rms of the residual
+
+        with r how many times that of white ones the variance of sums of residuals is.
+        """
+        a = np.ones(self.n)
+        X = self._least_squares(a, 1 / np.maximum(np.linalg.norm(self.factors[:, :, -1], axis=1), TINY))
+        X = self._least_squares(a, self._weights(X, a))
+        A = self._linear(X, a, self._weights(X, a))[0]
+        W, c = A[:, : len(X)], A[:, len(X) :]
+        left = c - W @ np.linalg.lstsq(W, c)[0]
+        known, size = np.sum(left**2, axis=0) / self._spread(X, a), np.sum(c**2, axis=0)
+        shown = known > NOTHING * np.maximum(size, TINY)
+        return np.sqrt(np.divide(DECISIVE, known, out=np.full(self.n, np.inf), where=shown & (known > 0)))
+
+    @cached_property
     def _covariance(self) -> Array:
         """Covariance of ln |a| with residuals as correlated as they are, shape (joint, joint); large where nothing is known."""
         X, a = self.fitted
