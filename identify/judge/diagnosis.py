@@ -45,7 +45,9 @@ def diagnosed(problem: Problem, X: Array) -> tuple[Suspect, ...]:
     if whole and small and (whole[0].cause, whole[0].joint) == (small[0].cause, small[0].joint):
         there = {(each.cause, each.joint) for each in whole}
         return (*whole, *(each for each in small if (each.cause, each.joint) not in there))
-    return (*whole, *_besides(problem.explicit, whole)) if whole else (*_impossible_signs(problem.explicit, X), *small)
+    if whole:
+        return (*whole, *_besides(problem.explicit, whole))
+    return tuple(small) or tuple(_impossible_signs(problem.explicit, X))  # of a wrong model friction may be negative, too
 
 
 def _besides(problem: Problem, whole: Sequence[Suspect]) -> Sequence[Suspect]:

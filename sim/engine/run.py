@@ -1,7 +1,7 @@
 """What a simulation gives: the log that a robot would give, and the truth behind it."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -10,9 +10,12 @@ from idbench.sim.robot.inverse_dynamics import coulomb_torque, inverse_dynamics
 from idbench.sim.robot.motors import Array
 from idbench.sim.robot.robot import Robot
 from idbench.sim.robot.tree import standard_parameters
+from idbench.sim.scenario.faults import with_faults
 from idbench.sim.scenario.scenario import Scenario
 from idbench.sim.trajectories import Reference
 from idbench.sim.trajectories.trajectory import require_in_range
+
+FAULTS = 11  # Stream of random numbers of what faults have
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,6 +64,25 @@ class Run:
         return self.log.run((i,))
 
 
+def faulty(run: Run) -> Run:
+    """The run with the faults of its scenario in the log; the truth stays.
+
+    Raises
+    ------
+    ScenarioError
+        If the robot has no joint that a fault names.
+    """
+    if not run.scenario.fault:
+        return run
+    logs = list[MotionLog]()
+    for i, seed in enumerate(run.seeds):
+        true = run.q[i], run.qd[i], np.gradient(run.qd[i], 1 / run.log.fs, axis=0)
+        rng = np.random.default_rng([seed, FAULTS])
+        logs.append(with_faults(run.robots[i], run.alone(i), true, run.scenario.fault, rng))
+    q, tau = np.stack([log.q for log in logs]), np.stack([log.tau for log in logs])
+    return replace(run, log=replace(run.log, fs=logs[0].fs, q=q, tau=tau))
+
+
 def ideal_log(robot: Robot, reference: Reference) -> MotionLog:
     """Return the log of a robot that follows `reference` exactly, with exact sensors.
 
@@ -91,4 +113,4 @@ def ideal_run(scenario: Scenario, seeds: Sequence[int], motions: Sequence[Refere
         most = np.abs(tau[i, :, j]).max()
         failures.setdefault(i, f"the torque of {robot.joints[j]} would be {most:.3g} N m, beyond its limit")
     log = MotionLog(scenario.fs, q, tau, TorqueChannel("instantaneous"))
-    return Run(scenario, tuple(seeds), [robot] * len(logs), motions[0], log, q, qd, tau, tau, failures)
+    return faulty(Run(scenario, tuple(seeds), [robot] * len(logs), motions[0], log, q, qd, tau, tau, failures))

@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from idbench.identify.blame import blamed
 from idbench.sim.engine.bench import NOISE, Bench, generators
-from idbench.sim.engine.run import Run
+from idbench.sim.engine.run import Run, faulty
 from idbench.sim.engine.watch import Watch, Watcher
 from idbench.sim.errors import ScenarioError
 from idbench.sim.robot.robot import Robot
@@ -88,7 +88,7 @@ def simulate(  # noqa: PLR0913  # all but two by their names
                 reported = 100 * step // bench.steps
                 progress(step / bench.steps)
     bench.tell(step)
-    run = bench.run(skipped)
+    run = faulty(bench.run(skipped))
     if throw and run.failures:
         raise ScenarioError(next(iter(run.failures.values())))
     return run

@@ -13,6 +13,7 @@ from idbench.sim.errors import ScenarioError
 from idbench.sim.frictions import AbstractFrictionLaw, CoulombViscous
 from idbench.sim.robot.payload import Payload
 from idbench.sim.robot.robot import Robot
+from idbench.sim.scenario.faults import Fault
 from idbench.sim.scenario.measurement import Ripple, TorqueMeasurement
 from idbench.sim.settings import NotNegative, Number, Positive, Seed, settings
 from idbench.sim.trajectories import AbstractTrajectory, Quintic
@@ -85,6 +86,8 @@ class Scenario:
     """What the log's torque is made of."""
     physics: Physics = Physics()
     """How the plant is integrated."""
+    fault: tuple[Fault, ...] = ()
+    """What is wrong with the robot or its log, one [[fault]] after the other."""
 
     def __post_init__(self) -> None:
         if self.drive.commands != self.controller.commanded:
@@ -109,7 +112,7 @@ class Scenario:
     def imperfections(self) -> list[str]:
         """The parts of the scenario that are not ideal."""
         ideal = Scenario("ideal", self.trajectory, self.robot)
-        parts = ("drive", "ripple", "encoder", "torque", "friction", "timing", "payload")
+        parts = ("drive", "ripple", "encoder", "torque", "friction", "timing", "payload", "fault")
         return [part for part in parts if getattr(self, part) != getattr(ideal, part)]
 
     @property

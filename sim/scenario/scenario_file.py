@@ -158,15 +158,17 @@ def to_toml(scenario: Scenario) -> str:
     for key, value in _settings(scenario):
         if is_dataclass(value):
             tables.append("\n".join(_table(key, value)))
+        elif key == "fault":
+            tables += ["\n".join(_table(key, fault, several=True)) for fault in value]
         elif value not in ("", (), None):
             simple.append(_explained(type(scenario), key, value))
     tables.sort(key=lambda table: len(table) > LONGEST)  # waypoints come last: the rest is what one changes
     return "\n\n".join(["\n".join(simple), *tables]) + "\n"
 
 
-def _table(key: str, part: Any) -> Iterator[str]:
+def _table(key: str, part: Any, *, several: bool = False) -> Iterator[str]:
     yield f"# {description(Scenario, key)}."
-    yield f"[{key}]"
+    yield f"[[{key}]]" if several else f"[{key}]"
     if key in KINDS:
         yield f"kind = {_kind(key, part)!r}  # {', '.join(KINDS[key])}".replace("'", '"')
     for name, value in _settings(part):
