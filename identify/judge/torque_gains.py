@@ -72,7 +72,7 @@ class TorqueGains:
     @cached_property
     def fitted(self) -> tuple[Array, Array]:
         """X, shape (p,), and a, shape (joint,), from which a Gauss-Newton step takes nothing more of the misfit."""
-        begins = [self.start, *([] if self.scaled else [self._homogeneous])]
+        begins = [self.start, self._odd_one, *([] if self.scaled else [self._homogeneous])]
         return min(map(self._settled, begins), key=lambda found: self._misfit(*found))
 
     @property
@@ -201,6 +201,19 @@ class TorqueGains:
         slopes[each, :, len(X) + each] = np.where(self.free[:, None], predicted, 0.0)
         rest = self.factors[:, :, -1] - a[:, None] * predicted
         return (slopes * weight[:, None, None]).reshape(-1, len(X) + self.n), (rest * weight[:, None]).ravel()
+
+    @property
+    def _odd_one(self) -> Array:
+        """Gains of which one is not as it begins: that of the joint for which the others then are explained best."""
+        level = 1 / np.maximum(np.linalg.norm(self.factors[:, :, -1], axis=1), TINY)
+        best, found = np.inf, self.start
+        for j in np.flatnonzero(self.free):
+            X = self._least_squares(self.start, np.where(np.arange(self.n) == j, 0.0, level))
+            predicted, a = self._predicted(X)[j], self.start.copy()
+            a[j] = predicted @ self.factors[j, :, -1] / max(float(predicted @ predicted), TINY)
+            if a[j] and (misfit := self._misfit(X, a)) < best:
+                best, found = misfit, a
+        return found
 
     @property
     def _homogeneous(self) -> Array:

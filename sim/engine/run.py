@@ -10,7 +10,7 @@ from idbench.sim.robot.inverse_dynamics import coulomb_torque, inverse_dynamics
 from idbench.sim.robot.motors import Array
 from idbench.sim.robot.robot import Robot
 from idbench.sim.robot.tree import standard_parameters
-from idbench.sim.scenario.faults import with_faults
+from idbench.sim.scenario.faults import require_joints, with_faults
 from idbench.sim.scenario.scenario import Scenario
 from idbench.sim.trajectories import Reference
 from idbench.sim.trajectories.trajectory import require_in_range
@@ -65,13 +65,7 @@ class Run:
 
 
 def faulty(run: Run) -> Run:
-    """The run with the faults of its scenario in the log; the truth stays.
-
-    Raises
-    ------
-    ScenarioError
-        If the robot has no joint that a fault names.
-    """
+    """The run with the faults of its scenario in the log; the truth stays."""
     if not run.scenario.fault:
         return run
     logs = list[MotionLog]()
@@ -104,6 +98,7 @@ def ideal_run(scenario: Scenario, seeds: Sequence[int], motions: Sequence[Refere
     A motion whose torques are beyond what the robot's actuators have is one that failed.
     """
     robot = scenario.real_robot
+    require_joints(robot, scenario.fault)
     logs = [ideal_log(robot, motion) for motion in motions]
     q = np.stack([log.q for log in logs])
     qd = np.stack([motion.qd for motion in motions])

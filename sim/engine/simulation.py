@@ -12,6 +12,7 @@ from idbench.sim.engine.run import Run, faulty
 from idbench.sim.engine.watch import Watch, Watcher
 from idbench.sim.errors import ScenarioError
 from idbench.sim.robot.robot import Robot
+from idbench.sim.scenario.faults import require_joints
 from idbench.sim.scenario.scenario import Scenario
 from idbench.sim.trajectories import Reference
 from idbench.sim.trajectories.time_optimal import approach
@@ -71,6 +72,7 @@ def simulate(  # noqa: PLR0913  # all but two by their names
     """
     seeds = tuple(seeds) or (scenario.seed,)
     robot = scenario.real_robot
+    require_joints(robot, scenario.fault)
     planned, skipped = _joined([_planned(scenario, robot, motion) for motion in motions or (None,)])
     h = scenario.drive.step_length(scenario.fs, scenario.physics.step)
     logged = partial(scenario.torque.logged, n=robot.n, rngs=generators(seeds[:1], NOISE))

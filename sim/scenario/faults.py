@@ -343,6 +343,15 @@ FAULTS: Mapping[str, Kind] = {
 """Every fault that a scenario can inject."""
 
 
+def require_joints(robot: Robot, faults: Sequence[Fault]) -> None:
+    """Raise ScenarioError if a robot has no joint that a fault names, or a fault is of the whole robot."""
+    for fault in faults:
+        whole, joints = FAULTS[fault.kind].whole, robot.joints
+        if fault.joint and (whole or fault.joint not in joints):
+            known = "it is of the whole robot: leave joint out" if whole else f"joints are {', '.join(joints)}"
+            raise ScenarioError(f"fault {fault.kind!r}: joint = {fault.joint!r}; {known}")
+
+
 def with_faults(
     robot: Robot, log: MotionLog, true: tuple[Array, Array, Array], faults: Sequence[Fault], rng: np.random.Generator
 ) -> MotionLog:
@@ -360,19 +369,11 @@ def with_faults(
         What is wrong.
     rng : numpy.random.Generator
         Of what is random in them.
-
-    Raises
-    ------
-    ScenarioError
-        If the robot has no joint that a fault names.
     """
     record = _Record(robot, log.fs, log.q.copy(), log.tau.copy(), true, rng)
     t, joints = record.t, robot.joints
     for fault in faults:
         kind = FAULTS[fault.kind]
-        if fault.joint and (kind.whole or fault.joint not in joints):
-            known = "it is of the whole robot: leave joint out" if kind.whole else f"joints are {', '.join(joints)}"
-            raise ScenarioError(f"fault {fault.kind!r}: joint = {fault.joint!r}; {known}")
         before = record.q.copy(), record.tau.copy()
         for j in (0,) if kind.whole else (joints.index(fault.joint),) if fault.joint else range(len(joints)):
             columns = (x[:, j] for x in (record.q, record.tau, *true))

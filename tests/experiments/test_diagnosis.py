@@ -51,8 +51,12 @@ def test_every_mistake_has_words():
         ("exchanged", "joint"),
         ("gravity", "base"),
         ("missing_torque", "torque"),
+        ("unit", "position"),
+        ("unit", "joint"),
+        ("stated", "request"),
     }
-    assert set(WORDINGS) == small | large | {("slip", "position")}
+    unknown = {("unknown", of) for of in ("position", "velocity", "acceleration", "load", "other joints", "moment")}
+    assert set(WORDINGS) == small | large | unknown | {("slip", "position")}
 
 
 @pytest.mark.parametrize("law", [wording.law for wording in WORDINGS.values() if wording.law])
