@@ -24,16 +24,7 @@ def link_torques(tree: KinematicTree, state: State, values: Mapping[Parameter, T
 
     J. Luh, M. Walker and R. Paul, "On-line computational scheme for mechanical manipulators", ASME J. Dynamic Systems,
     Measurement, and Control 102 (1980) 69-76. Base parameters in the place of those that are grouped into them give the same
-    torques.
-
-    Parameters
-    ----------
-    tree : KinematicTree
-        The robot.
-    state : State
-        Its motion.
-    values : mapping
-        Parameters of the links, each (..., time) or a number; those that are missing are zero.
+    torques. Values of parameters are each (..., time) or a number; those that are missing are zero.
     """
     at = state.shared(tree, lambda state: Twists(tree, state))
     torques: list[Term] = [0.0] * tree.n
@@ -54,17 +45,7 @@ def link_torques(tree: KinematicTree, state: State, values: Mapping[Parameter, T
 
 
 def torques(basis: Basis, state: State, X: Array) -> Array:
-    """Return the torques tau = D X of known parameters [N m], shape (..., joint, time): those of links without their columns.
-
-    Parameters
-    ----------
-    basis : Basis
-        The robot.
-    state : State
-        Its motion.
-    X : Array, shape (..., p)
-        Its parameters.
-    """
+    """Torques tau = D X of known X, shape (..., p) [N m], shape (..., joint, time): those of links without their columns."""
     return _total(basis, state, X, "explicit", lambda tree, values: link_torques(tree, state, values))
 
 
