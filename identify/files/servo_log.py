@@ -164,16 +164,9 @@ def _require_steady(path: Path, table: LogTable, t: Array) -> None:
 
 
 def ordered(columns: ServoColumns, joints: Sequence[str], actuators: Mapping[str, str], path: Path) -> ServoColumns:
-    """Return columns in the order of the joints; raise LogError if the log does not have them all.
+    """Columns in the order of the joints; raise LogError if the log does not have them all.
 
-    Parameters
-    ----------
-    columns, path
-        A log.
-    joints : sequence of str
-        Joints of the robot.
-    actuators : mapping of str to str
-        Joints of the actuators by whose names commands may be called.
+    Commands may be called by the names of actuators, each of a joint.
     """
     place = _order(columns, joints, path)
     called = [actuators.get(name, name) for name in columns.commanded]

@@ -90,16 +90,9 @@ def fixed(robot: LoadedRobot) -> PayloadEstimate:
 
 
 def with_known_robot(robot: LoadedRobot, names: tuple[str, ...], X: Array, covariance: Array) -> PayloadEstimate:
-    """Return the payload with the parameters of the robot, identified before, held; their sigma is in that of the payload.
+    """Payload by the logs with it, base parameters of the robot being held at an estimate X, shape (p,).
 
-    Parameters
-    ----------
-    robot : LoadedRobot
-        Of which the logs with the payload count.
-    names : tuple of str
-        Base parameters of the robot.
-    X, covariance : Array, shape (p,) and (p, p)
-        Their values.
+    Their covariance, shape (p, p), is a part of that of the payload.
     """
     basis, logs = robot.basis, marked(robot.loaded, 1.0)
     found = with_robot_held(robot, dict(zip(names, map(float, X), strict=True)))

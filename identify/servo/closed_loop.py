@@ -36,14 +36,8 @@ WAY = 6  # Ranges of its motion that a joint may cross in a step: beyond, it is 
 class ServoLoop:
     """Runs of one kind of servo, to be simulated with any parameters (see `idbench.identify.servo.servo_step`).
 
-    Parameters
-    ----------
-    runs : sequence of ServoRun
-        What was logged, and what is known of each servo.
-    step : float
-        Longest step [s].
-    count : float
-        Angle to whose multiples positions at rest are rounded [rad], as the servo reports them; 0: none are (see `count_of`).
+    Steps are at most `step` [s]. Positions at rest are rounded to multiples of `count` [rad], as the servo reports them; 0:
+    none are (see `count_of`).
     """
 
     def __init__(self, runs: Sequence[ServoRun], step: float, count: float = 0.0) -> None:
@@ -90,11 +84,8 @@ class ServoLoop:
 
     def _simulate_run(self, k: int, laws: Sequence[ServoLaw], ahead: Array, out: Array) -> None:
         """Write the positions of a run into `out`, shape (lane, sample)."""
-        from idbench.identify.servo.servo_step import (
-            Firmware,
-            at_samples,
-            motion,
-        )  # its compiler takes longer than many a command
+        # Its compiler takes longer than many a command.
+        from idbench.identify.servo.servo_step import Firmware, at_samples, motion
 
         (before, share) = self._places[k]
         begin = self._begin[k]

@@ -36,16 +36,8 @@ def cross_validate(found: Found, loop: ServoLoop, c: float, parts: int) -> LeftO
     H is the curvature of the objective, S the covariance of its gradient (P. J. Huber, 1967), both those that are left when
     every change of the parameters comes with the best beginnings of the runs. S adds up over runs, or pieces of them, each with
     the residual that it has if it is left out of the fit (CR3: R. M. Bell and D. F. McCaffrey, Survey Methodology 28 (2002)
-    169-181): a fall that alone shows viscous friction is fitted closely whatever the friction is.
-
-    Parameters
-    ----------
-    found, loop
-        A fit and its runs.
-    c : float
-        Scale of Fair's function [rad].
-    parts : int
-        Stretches of time into which each run is cut (see `stretches`).
+    169-181): a fall that alone shows viscous friction is fitted closely whatever the friction is. c is the scale of Fair's
+    function [rad], `parts` the number of stretches of time into which each run is cut (see `stretches`).
     """
     r = found.residual
     size, J, w, free = fair_rows(found, c)
