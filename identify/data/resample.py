@@ -51,7 +51,7 @@ class Repaired:
             require_positive(fs=fs)
         columns, stretches = torque_stretches(columns)
         clock = LogClock.of(columns)
-        sound, fs = clock.columns(columns), _round(1 / clock.period) if fs is None else fs
+        sound, fs = replace(columns.rows(clock.kept), t=clock.t), _round(1 / clock.period) if fs is None else fs
         found = list[MotionLog]()
         short = 0
         velocities = None

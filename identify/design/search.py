@@ -46,17 +46,13 @@ class Greedy:
 
     def pool(self, rng: np.random.Generator, at: Array, left: int, count: int) -> Array:
         """Return random waypoints that can be reached from one, and from which the first can in `left` moves."""
-        reach, half = self.reach, np.diff(self.limits.position, axis=1)[:, 0] / 2
+        by_velocity = self.limits.velocity * self.T / PEAKS[0]
+        reach = np.minimum(by_velocity, self.limits.acceleration * self.T**2 / PEAKS[1])  # of every joint [rad]
+        half = np.diff(self.limits.position, axis=1)[:, 0] / 2
         low = np.maximum(np.maximum(at - reach, -half), -left * reach)
         high = np.minimum(np.minimum(at + reach, half), left * reach)
         low = np.minimum(low, high)
         return rng.uniform(low, high, (count, len(at)))
-
-    @property
-    def reach(self) -> Array:
-        """Longest move of every joint [rad], shape (joint,)."""
-        by_velocity = self.limits.velocity * self.T / PEAKS[0]
-        return np.minimum(by_velocity, self.limits.acceleration * self.T**2 / PEAKS[1])
 
     def _matrices(self, at: Array, pool: Array) -> Array:
         """Return the information of moves, shape (move, p, p)."""

@@ -53,7 +53,6 @@ class ServoLoop:
         commands = np.concatenate([run.command for run in self.runs])
         self._fastest = WAY * (float(np.ptp(self.q[self.kept])) + float(np.ptp(commands)) + 1e-6) / self.h
         self._tracks = [self._track(run) for run in self.runs]
-        self._places = [self._place(run) for run in self.runs]
 
     def stacked(self, signals: Sequence[Array]) -> Array:
         """Signals of the runs, shape (run, sample), each with its last value after its end."""
@@ -87,21 +86,16 @@ class ServoLoop:
         # Its compiler takes longer than many a command.
         from idbench.identify.servo.servo_step import Firmware, at_samples, motion
 
-        (before, share) = self._places[k]
-        begin = self._begin[k]
+        run, begin = self.runs[k], self._begin[k]
         starts = begin.state + ahead * begin.per_angle
-        servo = self.runs[k].servo
+        servo = run.servo
+        steps = (run.t - run.t[0]) / self.h
+        before = steps.astype(np.int64)  # each sample
         firmware = Firmware(servo.slope, servo.kd, servo.limit, servo.speed_limit, servo.count, servo.steps)
         for lane, (law, start) in enumerate(zip(laws, starts.tolist(), strict=True)):
             path = motion(law, firmware, self._tracks[k], tuple(start), self.h, self._fastest)
-            out[lane, : len(before)] = at_samples(path, before, share, self.count)
+            out[lane, : len(before)] = at_samples(path, before, steps - before, self.count)
         out[:, len(before) :] = out[:, len(before) - 1 : len(before)]
-
-    def _place(self, run: ServoRun) -> tuple[npt.NDArray[np.int64], Array]:
-        """Step before each sample, and by how much of a step the sample is later."""
-        x = (run.t - run.t[0]) / self.h
-        before = x.astype(np.int64)
-        return before, x - before
 
     def _track(self, run: ServoRun) -> tuple[Array, ...]:
         from idbench.identify.servo.servo_step import Track

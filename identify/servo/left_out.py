@@ -92,12 +92,8 @@ def stretches(found: Found, loop: ServoLoop, clusters: int) -> int:
     """Number of stretches of each run: enough for so many clusters, no more than correlations allow."""
     r = found.residual
     wanted, least = (int(np.ceil(x / len(r))) for x in (clusters, MIN_CLUSTERS))
-    return max(least, min(wanted, loop.samples // _correlated(r)))
-
-
-def _correlated(r: Array) -> int:
-    """Correlation length of residuals [samples]."""
     power = np.abs(np.fft.rfft(r, 2 * r.shape[1], axis=1)) ** 2
     correlation = np.fft.irfft(power.mean(axis=0))[: r.shape[1]]
     small = np.flatnonzero(correlation < UNCORRELATED * correlation[0])
-    return int(small[0]) if len(small) and small[0] > 0 else 1
+    correlated = int(small[0]) if len(small) and small[0] > 0 else 1
+    return max(least, min(wanted, loop.samples // correlated))
