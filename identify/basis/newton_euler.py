@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import TypeAlias
 
 import numpy as np
 
@@ -56,11 +55,9 @@ def momenta(basis: Basis, state: State, X: Array) -> Array:
     return _total(basis, state, X, "momentum", lambda tree, values: link_torques(replace(tree, gravity=still), begun, values))
 
 
-Links: TypeAlias = Callable[[KinematicTree, Mapping[Parameter, Term]], list[Term]]
-"""Links and the values of their parameters -> what they add to each joint."""
-
-
-def _total(basis: Basis, state: State, X: Array, function: str, links: Links) -> Array:
+def _total(
+    basis: Basis, state: State, X: Array, function: str, links: Callable[[KinematicTree, Mapping[Parameter, Term]], list[Term]]
+) -> Array:
     """Sum over all blocks, shape (..., joint, time): links as `links` has it, others by their columns."""
     total = np.zeros(np.broadcast_shapes(state.q.shape, (*X.shape[:-1], 1, 1)))
     for block in basis.blocks:

@@ -109,7 +109,6 @@ class Twist(NamedTuple):
 
     v: Vector
     """Of the origin [m/s]."""
-
     w: Vector
     """Angular [rad/s]."""
 
