@@ -116,7 +116,7 @@ def _operations() -> Iterator[str]:
     def rows() -> Iterator[Sequence[str]]:
         for robot in ("scara", "puma560", "panda"):
             counts = [operations(RobotModel(robot).basis, model) for model in COLUMNS]
-            shares = [f"{c.multiplications} / {c.additions} / {c.differentiated}" for c in counts]
+            shares = [f"{c.multiplications} / {c.additions} / {c.derivatives}" for c in counts]
             yield [robot, *shares, *(f"{c.total / counts[0].total:.2f}" for c in counts[1:])]
 
     names = [f"{model} x / + / s" for model in COLUMNS]

@@ -7,18 +7,15 @@ from idbench.identify.basis.basis import Basis as Basis
 from idbench.identify.basis.block import AbstractBlock as AbstractBlock
 from idbench.identify.basis.block import AbstractConservativeBlock as AbstractConservativeBlock
 from idbench.identify.basis.block import Parameter as Parameter
-from idbench.identify.basis.friction.laws import ArctanFriction as ArctanFriction
 from idbench.identify.basis.friction.laws import AsymmetricViscousFriction as AsymmetricViscousFriction
 from idbench.identify.basis.friction.laws import Cogging as Cogging
 from idbench.identify.basis.friction.laws import CoulombFriction as CoulombFriction
 from idbench.identify.basis.friction.laws import Offset as Offset
 from idbench.identify.basis.friction.laws import SmoothFriction as SmoothFriction
-from idbench.identify.basis.friction.laws import TanhFriction as TanhFriction
 from idbench.identify.basis.friction.laws import TemperatureFriction as TemperatureFriction
 from idbench.identify.basis.friction.laws import ViscousFriction as ViscousFriction
 from idbench.identify.basis.friction.laws import arctan, tanh
 from idbench.identify.basis.friction.load import LoadFriction as LoadFriction
-from idbench.identify.basis.friction.shape import PowerFriction as PowerFriction
 from idbench.identify.basis.friction.shape import Shape as Shape
 from idbench.identify.basis.friction.shape import ShapedFriction as ShapedFriction
 from idbench.identify.basis.friction.shape import StribeckFriction as StribeckFriction
@@ -26,7 +23,6 @@ from idbench.identify.basis.friction.shape import free_stribeck, power, stribeck
 from idbench.identify.basis.joint_law import AbstractFriction as AbstractFriction
 from idbench.identify.basis.joint_law import AbstractJointLaw as AbstractJointLaw
 from idbench.identify.basis.joint_law import Armature as Armature
-from idbench.identify.basis.of_joints import Coupled as Coupled
 from idbench.identify.basis.of_joints import OfJoints as OfJoints
 from idbench.identify.basis.springs import Balancer as Balancer
 from idbench.identify.basis.springs import Spring as Spring

@@ -154,7 +154,7 @@ class AbstractColumns(AbstractBlock):
 
     @abstractmethod
     def columns(self, function: str, state: State) -> BlockColumns:
-        """Return the columns of a function of this name: explicit, momentum, remainder or energy."""
+        """Return the columns of a function of this name: explicit, momentum, remainder, energy or dissipation."""
 
     @final
     def explicit(self, state: State) -> BlockColumns:
@@ -176,6 +176,10 @@ class AbstractColumns(AbstractBlock):
         """Return h_i(q, qd) (Eq. 10)."""
         return self.columns("energy", state)
 
+    def dissipation(self, state: State) -> BlockColumns:
+        """Return qd' Gamma_f (Eq. 10)."""
+        return self.columns("dissipation", state)
+
 
 class AbstractConservativeBlock(AbstractBlock):
     """A block that stores energy and dissipates none: rigid bodies, rotors, springs."""
@@ -183,4 +187,4 @@ class AbstractConservativeBlock(AbstractBlock):
     @final
     def dissipation(self, state: State) -> BlockColumns:
         """Return no columns."""
-        return super().dissipation(state)
+        return {}

@@ -67,13 +67,10 @@ class AbstractFriction(AbstractJointLaw):
 
     symbol: ClassVar[str]
     """Letters of the parameter; the joint's number, from 1, follows them."""
-
     unit: ClassVar[str]
     """Unit of the parameter."""
-
     kind: ClassVar[Kind] = "friction"
     """What the parameter measures."""
-
     replaces: ClassVar[str] = ""
     """Letters of the law in whose place this one stands, if it stands in the place of one."""
 

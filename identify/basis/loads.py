@@ -58,7 +58,7 @@ HELD_SHARE = "payload"  # Condition of a log: the share of the payload that is h
 
 
 @dataclass(frozen=True, eq=False)
-class PayloadLink(AbstractColumns, AbstractConservativeBlock):
+class PayloadLink(AbstractConservativeBlock, AbstractColumns):
     """A payload on a link, XXL XYL XZL YYL YZL ZZL MXL MYL MZL ML in the frame of the link, in the logs that have it.
 
     W. Khalil, M. Gautier and P. Lemoine, "Identification of the payload inertial parameters of industrial manipulators", IEEE

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import TypeAlias
 
 import numpy as np
 
@@ -24,16 +23,7 @@ def link_torques(tree: KinematicTree, state: State, values: Mapping[Parameter, T
 
     J. Luh, M. Walker and R. Paul, "On-line computational scheme for mechanical manipulators", ASME J. Dynamic Systems,
     Measurement, and Control 102 (1980) 69-76. Base parameters in the place of those that are grouped into them give the same
-    torques.
-
-    Parameters
-    ----------
-    tree : KinematicTree
-        The robot.
-    state : State
-        Its motion.
-    values : mapping
-        Parameters of the links, each (..., time) or a number; those that are missing are zero.
+    torques. Values of parameters are each (..., time) or a number; those that are missing are zero.
     """
     at = state.shared(tree, lambda state: Twists(tree, state))
     torques: list[Term] = [0.0] * tree.n
@@ -54,17 +44,7 @@ def link_torques(tree: KinematicTree, state: State, values: Mapping[Parameter, T
 
 
 def torques(basis: Basis, state: State, X: Array) -> Array:
-    """Return the torques tau = D X of known parameters [N m], shape (..., joint, time): those of links without their columns.
-
-    Parameters
-    ----------
-    basis : Basis
-        The robot.
-    state : State
-        Its motion.
-    X : Array, shape (..., p)
-        Its parameters.
-    """
+    """Torques tau = D X of known X, shape (..., p) [N m], shape (..., joint, time): those of links without their columns."""
     return _total(basis, state, X, "explicit", lambda tree, values: link_torques(tree, state, values))
 
 
@@ -75,11 +55,9 @@ def momenta(basis: Basis, state: State, X: Array) -> Array:
     return _total(basis, state, X, "momentum", lambda tree, values: link_torques(replace(tree, gravity=still), begun, values))
 
 
-Links: TypeAlias = Callable[[KinematicTree, Mapping[Parameter, Term]], list[Term]]
-"""Links and the values of their parameters -> what they add to each joint."""
-
-
-def _total(basis: Basis, state: State, X: Array, function: str, links: Links) -> Array:
+def _total(
+    basis: Basis, state: State, X: Array, function: str, links: Callable[[KinematicTree, Mapping[Parameter, Term]], list[Term]]
+) -> Array:
     """Sum over all blocks, shape (..., joint, time): links as `links` has it, others by their columns."""
     total = np.zeros(np.broadcast_shapes(state.q.shape, (*X.shape[:-1], 1, 1)))
     for block in basis.blocks:

@@ -33,10 +33,6 @@ class OfJoints(AbstractColumns):
         columns: BlockColumns = getattr(self.block, function)(state)
         return {address: column for address, column in columns.items() if address[1].joint in self.joints}
 
-    def dissipation(self, state: State) -> BlockColumns:
-        """Return the columns of the dissipated power."""
-        return self.columns("dissipation", state)
-
     @property
     def is_nonlinear(self) -> bool:
         """Whether the block is."""
@@ -82,10 +78,6 @@ class Coupled(AbstractColumns):
             return {(row, self._own(p)): x for (row, p), x in columns.items()}
         weights = self.coupling.weights
         return {(j, self._own(p)): weights[j] * x for (_, p), x in columns.items() for j in np.flatnonzero(weights).tolist()}
-
-    def dissipation(self, state: State) -> BlockColumns:
-        """Return the columns of the dissipated power."""
-        return self.columns("dissipation", state)
 
     def _motor(self, state: State) -> State:
         """Return the motion of the motor."""

@@ -1,7 +1,7 @@
 """The cost of the columns: operations per sample, counted by evaluating them once on symbols."""
 
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 from idbench.identify.basis.basis import Basis
 from idbench.identify.basis.loads import HELD_SHARE
@@ -28,17 +28,11 @@ class Operations:
     """And subtractions, but for those of 0."""
     functions: int
     """Sines, cosines, and others that laws of friction have."""
-    differentiated: int
+    derivatives: int
     """Columns that are still to be differentiated."""
 
     def __str__(self) -> str:
-        counts = {
-            "multiplications": self.multiplications,
-            "additions": self.additions,
-            "functions": self.functions,
-            "derivatives": self.differentiated,
-        }
-        return ", ".join(f"{count} {name}" for name, count in counts.items() if count)
+        return ", ".join(f"{count} {name}" for name, count in asdict(self).items() if count)
 
     @property
     def total(self) -> int:

@@ -1,7 +1,6 @@
 """Columns of links as a list of operations: found once on symbols, done in pieces of the motion that stay in the cache."""
 
 from collections.abc import Callable, Hashable, Mapping
-from functools import partial
 from typing import Any, Generic, TypeVar
 
 import numpy as np
@@ -18,13 +17,7 @@ a long log at once twice as long."""
 
 
 class SignalOfSymbols:
-    """A signal (..., joint, time) that stands in for numbers: a single value of each joint, many times faster than arrays.
-
-    Parameters
-    ----------
-    of : callable
-        Joint -> its value.
-    """
+    """A signal (..., joint, time) that stands in for numbers: one value `of` each joint, many times faster than arrays."""
 
     def __init__(self, of: Callable[[int], Value]) -> None:
         self._of = of
@@ -33,33 +26,15 @@ class SignalOfSymbols:
         return self._of(place[-2])
 
 
-def recorded_motion(tape: Tape) -> State:
-    """Return a motion of symbols, one for each joint's position, velocity and acceleration."""
-    return motion_of_symbols(*(SignalOfSymbols(partial(tape.input, name)) for name in ("q", "qd", "qdd")))
-
-
-def at_one_instant(state: State) -> State:
-    """Return a motion of symbols, signals of shape (joint, 1), as one whose signals are single values."""
-    signals: tuple[Any, ...] = state.q, state.qd, state.qdd
-    return motion_of_symbols(*(SignalOfSymbols(x.values[:, 0].item) for x in signals))
-
-
 def motion_of_symbols(q: Any, qd: Any, qdd: Any, *, conditions: Mapping[str, Any] | None = None) -> State:
     """Return a motion whose signals are of symbols, not arrays of numbers."""
     return State(q, qd, lambda _: qdd, conditions or {})
 
 
 class Program(Generic[Key]):
-    """Values of a tape as functions of a motion.
+    """Values of a tape, those of some columns, as functions of a motion.
 
     Places are those of the signals, then of the results, then of values that are needed for a while, then of constants.
-
-    Parameters
-    ----------
-    tape : Tape
-        What was recorded.
-    columns : mapping
-        The values that are wanted.
     """
 
     def __init__(self, tape: Tape, columns: Mapping[Key, Value]) -> None:

@@ -76,36 +76,27 @@ class Balancer(AbstractWithoutMomentum, AbstractConservativeBlock):
 
     def remainder(self, state: State) -> BlockColumns:
         """Return forces times dl/dq."""
-        length, slope = self._length(state.q[..., self.joint, :])
-        forces = self._forces(length - self._least)
+        stroke, slope = self._stroke(state.q[..., self.joint, :])
+        forces = {"F0": np.ones_like(stroke), "Kb": stroke}
+        if self.volume is not None:
+            forces["Fg"] = (self.volume / (self.volume - stroke)) ** self.kappa
         return {(self.joint, self._parameter(x)): force * slope for x, force in forces.items()}
 
     def energy(self, state: State) -> BlockColumns:
         """Return the integrals of the forces over the length."""
-        length, _ = self._length(state.q[..., self.joint, :])
-        return {(0, self._parameter(x)): work for x, work in self._works(length - self._least).items()}
+        stroke, _ = self._stroke(state.q[..., self.joint, :])
+        works = {"F0": stroke, "Kb": stroke**2 / 2}
+        if self.volume is not None:
+            V, k = self.volume, self.kappa
+            works["Fg"] = -V * np.log(1 - stroke / V) if k == 1 else V / (k - 1) * ((1 - stroke / V) ** (1 - k) - 1)
+        return {(0, self._parameter(x)): work for x, work in works.items()}
 
     def _parameter(self, letters: str) -> Parameter:
         return Parameter(letters, self.joint, "stiffness", "N/m" if letters == "Kb" else "N")
 
-    @property
-    def _least(self) -> float:
-        return abs(self.a - self.b)
-
-    def _length(self, q: Array) -> tuple[Array, Array]:
-        """Return l and dl/dq."""
+    def _stroke(self, q: Array) -> tuple[Array, Array]:
+        """Return l - least and dl/dq."""
         angle = q - self.zero
         length = np.sqrt(self.a**2 + self.b**2 - 2 * self.a * self.b * np.cos(angle))
         long = np.maximum(length, 1e-9)
-        return length, self.a * self.b * np.sin(angle) / long
-
-    def _forces(self, stroke: Array) -> dict[str, Array]:
-        gas = {} if self.volume is None else {"Fg": (self.volume / (self.volume - stroke)) ** self.kappa}
-        return {"F0": np.ones_like(stroke), "Kb": stroke, **gas}
-
-    def _works(self, stroke: Array) -> dict[str, Array]:
-        gas = {}
-        if self.volume is not None:
-            V, k = self.volume, self.kappa
-            gas = {"Fg": -V * np.log(1 - stroke / V) if k == 1 else V / (k - 1) * ((1 - stroke / V) ** (1 - k) - 1)}
-        return {"F0": stroke, "Kb": stroke**2 / 2, **gas}
+        return length - abs(self.a - self.b), self.a * self.b * np.sin(angle) / long

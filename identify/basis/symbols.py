@@ -17,12 +17,7 @@ Values = list[Any]
 
 
 class SymbolArray(NDArrayOperatorsMixin):
-    """An array of values that are recorded, for code that is written for arrays of numbers.
-
-    Parameters
-    ----------
-    values : array_like
-        Symbols and numbers, of any shape.
+    """An array of values that are recorded, symbols and numbers of any shape, for code that is written for arrays of numbers.
 
     Raises
     ------

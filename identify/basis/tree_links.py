@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Set
 from dataclasses import dataclass, replace
-from functools import cache, lru_cache
+from functools import cache, lru_cache, partial
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -20,7 +20,7 @@ from idbench.identify.basis.friction.laws import CoulombFriction, ViscousFrictio
 from idbench.identify.basis.friction.load import TiedFriction
 from idbench.identify.basis.joint_law import AbstractFriction, Armature
 from idbench.identify.basis.of_joints import Coupled, OfJoints
-from idbench.identify.basis.replay import Program, at_one_instant, recorded_motion
+from idbench.identify.basis.replay import Program, SignalOfSymbols, motion_of_symbols
 from idbench.identify.basis.springs import Spring
 from idbench.identify.basis.symbols import SymbolArray
 from idbench.identify.basis.tape import Tape
@@ -126,7 +126,7 @@ def energy(V: Twist, up: Vector, height: Term) -> tuple[Term, ...]:
 
 
 @dataclass(frozen=True)
-class TreeLinks(AbstractColumns, AbstractConservativeBlock):
+class TreeLinks(AbstractConservativeBlock, AbstractColumns):
     """Rigid links of a tree, ten parameters each: XX1 XY1 XZ1 YY1 YZ1 ZZ1 MX1 MY1 MZ1 M1, XX2, ...
 
     The inertia matrix and the first moments are about the origin of the link's frame, in its axes. By Newton and Euler, and by
@@ -154,7 +154,9 @@ class TreeLinks(AbstractColumns, AbstractConservativeBlock):
         """Return the columns that are asked for and not zero at all times."""
         if isinstance(state.q, np.ndarray):
             return _replay(self.tree, self.only, function).of(state)
-        columns: Any = _asked(_formulas(self.tree, function, at_one_instant(state)), self.only)
+        signals: tuple[Any, ...] = state.q, state.qd, state.qdd
+        at_one_instant = motion_of_symbols(*(SignalOfSymbols(x.values[:, 0].item) for x in signals))
+        columns: Any = _asked(_formulas(self.tree, function, at_one_instant), self.only)
         return {key: SymbolArray([x]) for key, x in columns.items()}
 
 
@@ -177,7 +179,8 @@ def _replay(tree: KinematicTree, only: frozenset[Parameter] | None, function: st
 @lru_cache(maxsize=32)
 def _recorded(tree: KinematicTree, function: str) -> tuple[Tape, Mapping[tuple[int, Parameter], Term]]:
     tape = Tape()
-    return tape, _formulas(tree, function, recorded_motion(tape))
+    motion = motion_of_symbols(*(SignalOfSymbols(partial(tape.input, name)) for name in ("q", "qd", "qdd")))
+    return tape, _formulas(tree, function, motion)
 
 
 def _formulas(tree: KinematicTree, function: str, state: State) -> dict[tuple[int, Parameter], Term]:

@@ -109,7 +109,6 @@ class Twist(NamedTuple):
 
     v: Vector
     """Of the origin [m/s]."""
-
     w: Vector
     """Angular [rad/s]."""
 
@@ -123,15 +122,7 @@ def bracket(a: Twist, b: Twist) -> Twist:
 
 
 class Placement:
-    """Where the frame of a link stands in that of its parent, at all times.
-
-    Parameters
-    ----------
-    joint : Joint
-        That moves it.
-    q : Array, shape (..., time)
-        Its position [rad or m].
-    """
+    """Where the frame of a link stands in that of its parent, its joint at q [rad or m], shape (..., time)."""
 
     def __init__(self, joint: Joint, q: Term) -> None:
         along = np.outer(joint.axis, joint.axis)
@@ -173,15 +164,7 @@ class Placement:
 
 
 class Twists:
-    """Velocities, accelerations and unit motions of every link.
-
-    Parameters
-    ----------
-    tree : KinematicTree
-        The robot.
-    state : State
-        Its motion.
-    """
+    """Velocities, accelerations and unit motions of every link."""
 
     def __init__(self, tree: KinematicTree, state: State) -> None:
         self._tree, self._state = tree, proxy(state)  # the state keeps its twists: a circle would outlive long logs' pieces

@@ -109,10 +109,6 @@ class LogClock:
         steps = np.diff(self.t)
         return bool(np.abs(steps - steps.mean()).max() <= STEADY * steps.mean())
 
-    def columns(self, columns: LogColumns) -> LogColumns:
-        """Return the rows that count, at their times."""
-        return replace(columns.rows(self.kept), t=self.t)
-
     def words(self) -> Iterator[str]:
         """Yield what was done, a sentence each."""
         every = len(self.kept) + self.repeated + self.backward + self.broken

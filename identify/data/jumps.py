@@ -16,12 +16,9 @@ MAX_STEPS = 1000  # Steps of a difference up to which rounding of the step itsel
 
 
 def encoder_steps(q: Array) -> Array:
-    """Return the step of every joint's encoder [rad], shape (joint,); NaN where positions are no multiples of one.
+    """Step of every joint's encoder [rad], shape (joint,), by logged positions q [rad], shape (..., time, joint).
 
-    Parameters
-    ----------
-    q : Array, shape (..., time, joint)
-        Logged positions [rad].
+    NaN where positions are no multiples of one.
     """
     moved = np.abs(np.diff(q, axis=-2)).reshape(-1, q.shape[-1])
     return np.array([_step(moved[:, j]) for j in range(q.shape[-1])])
@@ -83,17 +80,10 @@ class Jump:
 
 
 def jumps(q: Array, fs: float) -> list[Jump]:
-    """Return the jumps of positions, joint by joint.
+    """Jumps of positions q [rad, m], shape (time, joint), sampled at fs [Hz], joint by joint.
 
     A step counts that is larger than 99 % of the joint's steps, and farther from the median of its neighbours than these
     scatter: a fast motion has fast neighbours.
-
-    Parameters
-    ----------
-    q : Array, shape (time, joint)
-        Positions [rad, m].
-    fs : float
-        Sampling frequency [Hz].
 
     Examples
     --------

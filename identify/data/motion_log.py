@@ -131,13 +131,9 @@ class MotionLog:
         return f"MotionLog: {what}, {self.samples / self.fs:.4g} s at {self.fs:.5g} Hz; torque {self.torque.meaning}{late}"
 
     def _repr_html_(self) -> str:
-        rows = [
-            [
-                self.joints[j] if self.joints else f"joint {j + 1}",
-                *(f"{x:.4g}" for x in (q.min(), q.max(), tau.min(), tau.max())),
-            ]
-            for j, (q, tau) in enumerate(zip(np.moveaxis(self.q, -1, 0), np.moveaxis(self.tau, -1, 0), strict=True))
-        ]
+        names = self.joints or [f"joint {j + 1}" for j in range(self.n)]
+        each = zip(names, np.moveaxis(self.q, -1, 0), np.moveaxis(self.tau, -1, 0), strict=True)
+        rows = [[name, *(f"{x:.4g}" for x in (q.min(), q.max(), tau.min(), tau.max()))] for name, q, tau in each]
         return html_table(repr(self), ["", "from [rad, m]", "to", "torque from", "to"], rows)
 
     def __post_init__(self) -> None:

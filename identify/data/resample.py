@@ -51,7 +51,7 @@ class Repaired:
             require_positive(fs=fs)
         columns, stretches = torque_stretches(columns)
         clock = LogClock.of(columns)
-        sound, fs = clock.columns(columns), _round(1 / clock.period) if fs is None else fs
+        sound, fs = replace(columns.rows(clock.kept), t=clock.t), _round(1 / clock.period) if fs is None else fs
         found = list[MotionLog]()
         short = 0
         velocities = None
@@ -82,23 +82,10 @@ class Repaired:
 
 
 def resample(t: Array, q: Array, tau: Array, torque: TorqueChannel, fs: float, t_tau: Array | None = None) -> MotionLog:
-    """Return a log at `fs` [Hz] of samples at any increasing times.
+    """Log at `fs` [Hz] of samples at any increasing times t [s], shape (time,), those of torques being `t_tau` if given.
 
-    Positions by a cubic spline; torques by straight lines, or, where they are held, by the mean of what is held over each new
-    period: the new log's torque is then `averaged`, with the same delay.
-
-    Parameters
-    ----------
-    t : Array, shape (time,)
-        [s], increasing.
-    q, tau : Array, shape (time, joint)
-        [rad], [N m].
-    torque : TorqueChannel
-        What the torque means.
-    fs : float
-        [Hz].
-    t_tau : Array, shape (time of torques,), optional
-        Times of the torques, by default those of the positions [s].
+    Positions q [rad] by a cubic spline; torques tau [N m], shape (time, joint), by straight lines, or, where they are held, by
+    the mean of what is held over each new period: the new log's torque is then `averaged`, with the same delay.
 
     Raises
     ------

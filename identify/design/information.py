@@ -117,19 +117,10 @@ class Information:
         return np.array([parameter.kind in FRICTION for parameter in self.basis.parameters])
 
     def slope(self, motion: Array, of_rows: Array, of_torques: Array) -> Array:
-        """Gradient of sums of products with columns by positions, velocities and accelerations.
+        """Gradient of sums of products with columns by positions, velocities and accelerations, shape (3, time, joint).
 
-        Parameters
-        ----------
-        motion : Array, shape (4, time, joint)
-            [rad], [rad/s], ...
-        of_rows, of_torques : Array, shape (time, joint, p)
-            What weighted columns are multiplied by, and what those are of which frictions alone are weighted.
-
-        Returns
-        -------
-        Array, shape (3, time, joint)
-            Derivatives of the sum over the row and the parameter.
+        Weighted columns of a motion, shape (4, time, joint), are multiplied by `of_rows`, those of which frictions alone are
+        weighted by `of_torques`, shape (time, joint, p) each.
         """
         n = self.basis.n
         steps = np.array([STEP, STEP, 1.0])

@@ -46,17 +46,13 @@ class Greedy:
 
     def pool(self, rng: np.random.Generator, at: Array, left: int, count: int) -> Array:
         """Return random waypoints that can be reached from one, and from which the first can in `left` moves."""
-        reach, half = self.reach, np.diff(self.limits.position, axis=1)[:, 0] / 2
+        by_velocity = self.limits.velocity * self.T / PEAKS[0]
+        reach = np.minimum(by_velocity, self.limits.acceleration * self.T**2 / PEAKS[1])  # of every joint [rad]
+        half = np.diff(self.limits.position, axis=1)[:, 0] / 2
         low = np.maximum(np.maximum(at - reach, -half), -left * reach)
         high = np.minimum(np.minimum(at + reach, half), left * reach)
         low = np.minimum(low, high)
         return rng.uniform(low, high, (count, len(at)))
-
-    @property
-    def reach(self) -> Array:
-        """Longest move of every joint [rad], shape (joint,)."""
-        by_velocity = self.limits.velocity * self.T / PEAKS[0]
-        return np.minimum(by_velocity, self.limits.acceleration * self.T**2 / PEAKS[1])
 
     def _matrices(self, at: Array, pool: Array) -> Array:
         """Return the information of moves, shape (move, p, p)."""
@@ -72,16 +68,9 @@ MEMORY = 20  # Steps that L-BFGS remembers
 
 
 class DesignSearch:
-    """Minimises what plans cost; what was found so far outlives an interruption.
+    """Minimises what plans cost from several coefficients, shape (m, joint); what was found outlives an interruption.
 
-    Parameters
-    ----------
-    starts : sequence of Array, shape (m, joint)
-        Coefficients to begin with.
-    steps : int
-        How many steps there will be in all, for the progress.
-    progress : callable, optional
-        Receives how much of the work is done, from 0 to 1.
+    Progress, the share of all steps that is done, is reported from 0 to 1.
     """
 
     def __init__(self, starts: Sequence[Array], steps: int, progress: Callable[[float], None] | None = None) -> None:
@@ -96,17 +85,7 @@ class DesignSearch:
         return self.found[0]
 
     def run(self, plan: Plan, keep: int, rounds: int) -> None:
-        """Descend from the best of what was found, by L-BFGS; Ctrl-C ends it with what there is.
-
-        Parameters
-        ----------
-        plan : Plan
-            What is asked.
-        keep : int
-            How many are followed.
-        rounds : int
-            Most steps from each.
-        """
+        """Descend from the best `keep` of what was found, by L-BFGS, `rounds` steps each; Ctrl-C ends it with what there is."""
         if self.interrupted:
             return
         ends = [_End(np.inf, start) for start in self.found[:keep]]

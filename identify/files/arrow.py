@@ -68,9 +68,8 @@ def read_text(path: Path) -> LogTable:
     except (pa.ArrowException, gzip.BadGzipFile, EOFError) as error:
         raise LogError(f"cannot read the log {path} as CSV: {str(error).splitlines()[0]}") from error
     first = 1 + skipped + (0 if names else 1)
-    cleaned = [name.strip(' "') for name in table.column_names]
-    _require_single(path, cleaned)
-    return _table(cleaned, (_numbers(column, first) for column in table.columns), named=not names or not names[0].isdigit())
+    values = (_numbers(column, first) for column in table.columns)
+    return _table(path, table.column_names, values, named=not names or not names[0].isdigit())
 
 
 def read_parquet(path: Path) -> LogTable:
@@ -83,14 +82,9 @@ def read_parquet(path: Path) -> LogTable:
     except pa.ArrowException as error:
         words = str(error).splitlines()[0]
         raise LogError(f"cannot read the log {path} as Parquet (a CSV file's name must end with .csv): {words}") from error
-    cleaned = [name.strip(' "') for name in table.column_names]
-    _require_single(path, cleaned)
-    made = _table(cleaned, map(_entries, table.columns), (table.schema.metadata or {}).get(TORQUE))
-    return replace(made, entries={name: x for name, x in names_beside(path).items() if _has(made, name, len(x))})
-
-
-def _has(table: LogTable, name: str, entries: int) -> bool:
-    return name in table.columns and table.columns[name].shape[1:] == (entries,)
+    made = _table(path, table.column_names, map(_entries, table.columns), (table.schema.metadata or {}).get(TORQUE))
+    entries = {name: x for name, x in names_beside(path).items() if name in made.columns}
+    return replace(made, entries={name: x for name, x in entries.items() if made.columns[name].shape[1:] == (len(x),)})
 
 
 def _opened(path: Path) -> IO[bytes]:
@@ -223,16 +217,11 @@ def _numbers(column: "pa.ChunkedArray[Any]", first: int) -> Array | str:
     """Return a column as numbers, an empty cell as NaN, which no log may have; what it holds if these are none."""
     pa = arrow()
     if pa.types.is_temporal(column.type):
-        return _seconds(column)
+        times = column.to_numpy().astype("datetime64[ns]")  # dates, or times of the day: [s] from the first on
+        return np.asarray((times - times[0]) / np.timedelta64(1, "s"), dtype=np.float64)
     if not (pa.types.is_floating(column.type) or pa.types.is_integer(column.type) or pa.types.is_null(column.type)):
         return f"{column.type}, not numbers{_culprit(column, first)}"
     return _floats(column.combine_chunks() if column.num_chunks > 1 else column.chunk(0)) if column.num_chunks else np.empty(0)
-
-
-def _seconds(column: "pa.ChunkedArray[Any]") -> Array:
-    """Return dates or times of the day [s], from the first on."""
-    values = column.to_numpy().astype("datetime64[ns]")
-    return np.asarray((values - values[0]) / np.timedelta64(1, "s"), dtype=np.float64)
 
 
 def _culprit(column: "pa.ChunkedArray[Any]", first: int) -> str:
@@ -245,8 +234,12 @@ def _culprit(column: "pa.ChunkedArray[Any]", first: int) -> str:
     return ""
 
 
-def _table(names: Sequence[str], values: Iterable[Array | str], torque: bytes | None = None, named: bool = True) -> LogTable:
+def _table(
+    path: Path, names: Sequence[str], values: Iterable[Array | str], torque: bytes | None = None, named: bool = True
+) -> LogTable:
     """Return a table of the columns that are numbers, and of what the others are."""
-    found = dict(zip(names, values, strict=True))
+    cleaned = [name.strip(' "') for name in names]
+    _require_single(path, cleaned)
+    found = dict(zip(cleaned, values, strict=True))
     words = {name: column for name, column in found.items() if isinstance(column, str)}
     return LogTable({name: column for name, column in found.items() if not isinstance(column, str)}, torque, named, words=words)

@@ -13,7 +13,7 @@ import scipy
 from idbench.identify.arrays import Array
 from idbench.identify.errors import LogError
 from idbench.identify.files.arrow import read_parquet, read_text
-from idbench.identify.files.lerobot import data_file, is_data_set
+from idbench.identify.files.lerobot import data_file
 from idbench.identify.files.table import LogTable, require_room
 
 Columns = tuple[dict[str, Array], dict[str, tuple[str, ...]]]
@@ -252,8 +252,7 @@ def read_table(path: Path) -> LogTable:
     LogError
         If it cannot be read, is of no kind that is known, or is empty.
     """
-    if is_data_set(path):
-        path = data_file(path)
+    path = data_file(path)
     bag = path.is_dir() and (path / "metadata.yaml").is_file()
     if path.is_dir() and not bag and not any(path.glob("*.parquet")):
         raise LogError(f"{path} is a folder: give a file in it, such as its log.parquet")

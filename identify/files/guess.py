@@ -23,21 +23,7 @@ WORDS = {
 }
 """Words in the names of columns, by what they stand for; the first that is there holds."""
 
-OTHERS = (
-    "cmd",
-    "command",
-    "commanded",
-    "des",
-    "desired",
-    "ref",
-    "reference",
-    "target",
-    "set",
-    "setpoint",
-    "goal",
-    "error",
-    "ext",
-)
+OTHERS = "cmd command commanded des desired ref reference target set setpoint goal error ext"
 """Words of columns that are not what was measured."""
 
 EPISODES = ("episode_index", "episode", "run", "trial")  # Columns that distinguish the runs of a file
@@ -79,14 +65,7 @@ class Guess:
 
 
 def guess(path: Path, table: LogTable | None = None) -> Guess:
-    """Probable layout of a file's columns.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    table : LogTable, optional
-        What it holds, where that was read already.
+    """Probable layout of the columns of a file, whose table may have been read already.
 
     Raises
     ------
@@ -216,7 +195,7 @@ def _parsed(name: str) -> _Name | None:
     """Quantity and joint of a column's name; None if it is neither a joint's quantity nor a time."""
     bare = re.sub(r"\s*[\[(][^\])]*[\])]\s*$", "", name)
     tokens = re.findall(r"[a-z]+|\d+", re.sub(r"(?<=[a-z])(?=[A-Z])", "_", bare).lower())
-    if set(tokens) & set(OTHERS):
+    if set(tokens) & set(OTHERS.split()):
         return None
     for kind, words in WORDS.items():
         hits = [token for token in tokens if token in words.split()]

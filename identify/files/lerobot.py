@@ -9,18 +9,15 @@ INFO = Path("meta") / "info.json"  # What describes a data set
 SUFFIX = ".pos"  # What names of its joints end with
 
 
-def data_file(folder: Path) -> Path:
-    """Return the file with the episodes of a data set; raise LogError if there is none, or are several."""
-    files = sorted((folder / "data").rglob("*.parquet"))
+def data_file(path: Path) -> Path:
+    """File with the episodes of a data set, or a path that is none; raise LogError if there is no such file, or are several."""
+    if not (path.is_dir() and (path / INFO).is_file()):
+        return path
+    files = sorted((path / "data").rglob("*.parquet"))
     if len(files) != 1:
-        names = ", ".join(str(path.relative_to(folder)) for path in files[:4]) or "none"
-        raise LogError(f"{folder} is a data set with {len(files)} files of episodes ({names}): name one of them")
+        names = ", ".join(str(file.relative_to(path)) for file in files[:4]) or "none"
+        raise LogError(f"{path} is a data set with {len(files)} files of episodes ({names}): name one of them")
     return files[0]
-
-
-def is_data_set(path: Path) -> bool:
-    """True if a folder is a data set of LeRobot."""
-    return path.is_dir() and (path / INFO).is_file()
 
 
 def names_beside(path: Path) -> dict[str, tuple[str, ...]]:

@@ -12,7 +12,7 @@ from idbench.identify.files.formats import read_table
 from idbench.identify.files.guess import EPISODES
 from idbench.identify.files.guess_units import FARTHEST, unit_of_times
 from idbench.identify.files.layout import LogLayout, Source, matching
-from idbench.identify.files.lerobot import data_file, is_data_set
+from idbench.identify.files.lerobot import data_file
 from idbench.identify.files.reading import LogFiles
 from idbench.identify.files.table import LogTable, factor
 
@@ -78,7 +78,7 @@ def read_servo_log(
     for quantity in (*columns, *units):
         if quantity not in USUAL:
             raise SettingError(f"{quantity!r} is no quantity of a servo's log; known: {', '.join(USUAL)}")
-    path = data_file(path) if is_data_set(path) else path
+    path = data_file(path)
     table = read_table(path)
     beside = LogLayout.beside(path)
     layout = _stated(path, table, beside[0] if beside else LogLayout(), columns, units, rows or {})
@@ -164,16 +164,9 @@ def _require_steady(path: Path, table: LogTable, t: Array) -> None:
 
 
 def ordered(columns: ServoColumns, joints: Sequence[str], actuators: Mapping[str, str], path: Path) -> ServoColumns:
-    """Return columns in the order of the joints; raise LogError if the log does not have them all.
+    """Columns in the order of the joints; raise LogError if the log does not have them all.
 
-    Parameters
-    ----------
-    columns, path
-        A log.
-    joints : sequence of str
-        Joints of the robot.
-    actuators : mapping of str to str
-        Joints of the actuators by whose names commands may be called.
+    Commands may be called by the names of actuators, each of a joint.
     """
     place = _order(columns, joints, path)
     called = [actuators.get(name, name) for name in columns.commanded]

@@ -15,11 +15,7 @@ TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}  # [s]
 POSITIONS = {"rad": 1.0, "deg": np.pi / 180, "mrad": 1e-3, "rev": 2 * np.pi, "m": 1.0, "cm": 1e-2, "mm": 1e-3}
 """Units of positions in rad and m, by name."""
 
-# [rad/s, m/s]
-VELOCITIES = {
-    **{f"{unit}/s": size for unit, size in POSITIONS.items()},
-    "rpm": 2 * np.pi / 60,
-}
+VELOCITIES = {f"{unit}/s": size for unit, size in POSITIONS.items()} | {"rpm": 2 * np.pi / 60}  # [rad/s, m/s]
 TORQUES = {
     "N m": 1.0,
     "mN m": 1e-3,

@@ -46,12 +46,8 @@ def identify_drive_gains(robot: LoadedRobot) -> GainEstimate:
     A payload whose mass, or more, is known makes known torques: they set the scale of each joint's current. Currents count as
     noisy, each joint's by a level of its own, the motion as exact. Least squares with currents on the side of the parameters
     instead finds gains too small, the more noise they have; see `DriveGains`.
-    Ratios of the gains to those in the logs are iterated, ratio(k+1) = ratio(k) g, g the gains of tau(ratio(k)).
-
-    Parameters
-    ----------
-    robot : LoadedRobot
-        Its logs, read with some gains from which the search begins, and what is known of the payload.
+    Ratios of the gains to those with which the logs were read are iterated, ratio(k+1) = ratio(k) g, g the gains of
+    tau(ratio(k)).
 
     Raises
     ------

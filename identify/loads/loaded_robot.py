@@ -44,8 +44,6 @@ class LoadedRobot:
     """Generalized least squares by default."""
     known: Mapping[str, float] = field(default_factory=dict)
     """Parameters of the payload that are known, such as ML, its mass [kg]."""
-    link: int | None = None
-    """Number of the joint whose link holds it, from 0; the last by default."""
 
     def __post_init__(self) -> None:
         if not self.loaded:
@@ -61,8 +59,7 @@ class LoadedRobot:
     @cached_property
     def both(self) -> BaseParameters:
         """The base parameters of robot and payload."""
-        link = self.tree.n - 1 if self.link is None else self.link
-        return BaseParameters.of(self.tree, self.standard + PayloadLink(self.tree, link))
+        return BaseParameters.of(self.tree, self.standard + PayloadLink(self.tree, self.tree.n - 1))
 
     @cached_property
     def names(self) -> tuple[str, ...]:

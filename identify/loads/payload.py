@@ -12,7 +12,6 @@ import scipy
 
 from idbench.identify.arrays import Array
 from idbench.identify.data.kinematics import INERTIAL
-from idbench.identify.data.motion_log import MotionLog
 from idbench.identify.errors import IdentificationError, LogError
 from idbench.identify.estimators.estimate import Estimate
 from idbench.identify.estimators.problem import Problem
@@ -90,16 +89,9 @@ def fixed(robot: LoadedRobot) -> PayloadEstimate:
 
 
 def with_known_robot(robot: LoadedRobot, names: tuple[str, ...], X: Array, covariance: Array) -> PayloadEstimate:
-    """Return the payload with the parameters of the robot, identified before, held; their sigma is in that of the payload.
+    """Payload by the logs with it, base parameters of the robot being held at an estimate X, shape (p,).
 
-    Parameters
-    ----------
-    robot : LoadedRobot
-        Of which the logs with the payload count.
-    names : tuple of str
-        Base parameters of the robot.
-    X, covariance : Array, shape (p,) and (p, p)
-        Their values.
+    Their covariance, shape (p, p), is a part of that of the payload.
     """
     basis, logs = robot.basis, marked(robot.loaded, 1.0)
     found = with_robot_held(robot, dict(zip(names, map(float, X), strict=True)))
@@ -136,8 +128,11 @@ def difference(robot: LoadedRobot) -> PayloadEstimate:
 
     X(k+1) = argmin |w(k) (Y_loaded - Y_without - W X)|, w(k) one over the rms residual of each joint.
     """
-    pairs = list(zip(robot.without, robot.loaded, strict=False))
-    if not pairs or len(robot.without) != len(robot.loaded) or not all(_repeated(*pair) for pair in pairs):
+    same = [
+        one.q.shape == other.q.shape and np.sqrt(np.mean((one.q - other.q) ** 2)) < REPEATED
+        for one, other in zip(robot.without, robot.loaded, strict=False)
+    ]
+    if not same or len(robot.without) != len(robot.loaded) or not all(same):
         raise LogError(
             "the logs with the payload do not repeat those without it, sample by sample, on which the difference of "
             "torques rests: use another way"
@@ -163,8 +158,8 @@ WAYS: Mapping[str, Callable[[LoadedRobot], PayloadEstimate]] = {
 
 def _as_link(robot: LoadedRobot) -> tuple[Array, Array]:
     """Return T, which makes of the payload's free parameters what they add to the robot's, and what known ones add."""
-    p, link = len(robot.standard.names), robot.tree.n - 1 if robot.link is None else robot.link
-    own = [robot.standard.names.index(f"{letters}{link + 1}") for letters in INERTIAL]
+    p = len(robot.standard.names)
+    own = [robot.standard.names.index(f"{letters}{robot.tree.n}") for letters in INERTIAL]
     add = robot.robot.K[:, own]  # of ten parameters of the link
     of_payload_ = [i for i, k in enumerate(robot.both.kept) if k >= p]
     K = robot.both.K[of_payload_, p:]
@@ -173,11 +168,6 @@ def _as_link(robot: LoadedRobot) -> tuple[Array, Array]:
     free = [names.index(name) for name in robot.names]
     known = T @ np.array([robot.known.get(name, 0.0) for name in names])
     return T[:, free], known
-
-
-def _repeated(one: MotionLog, other: MotionLog) -> bool:
-    """True if two logs are of one motion."""
-    return one.q.shape == other.q.shape and bool(np.sqrt(np.mean((one.q - other.q) ** 2)) < REPEATED)
 
 
 def _outer(lower: Array) -> Array:

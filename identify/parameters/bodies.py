@@ -82,16 +82,7 @@ class Bodies:
     (T. Lee, P. M. Wensing and F. C. Park, "Geometric robot dynamic identification: a convex programming approach", IEEE T-RO 36
     (2020) 348-365): it depends on no frame, is half the square of relative changes where they are small, and infinite where no
     body is. Armatures and frictions, which are not negative, count as matrices of one row. For others, and the parameters of a
-    link of which one is held, it is 1/2 ((x - x0) / size)^2.
-
-    Parameters
-    ----------
-    parameters : sequence of Parameter
-        The standard parameters.
-    given : Array, shape (p,)
-        Theirs.
-    size : Array, shape (p,)
-        What counts as a large change of those that are no inertia of a link.
+    link of which one is held, it is 1/2 ((x - x0) / size)^2. Given values and sizes are of the standard parameters, shape (p,).
     """
 
     def __init__(self, parameters: Sequence[Parameter], given: Array, size: Array) -> None:
@@ -176,18 +167,9 @@ def nearest(A: Array, b: Array, bodies: Bodies, weight: float) -> Array:
 
         L^-T V (S U'(b - A x) - weight V' L^-1 g) / (S^2 + weight)
 
-    so that however well A knows some directions, and badly others, none is lost by rounding. The weight comes down in stages.
-
-    Parameters
-    ----------
-    A : Array, shape (r, p)
-        Rows, in units of their standard deviation.
-    b : Array, shape (r,)
-        What they measure.
-    bodies : Bodies
-        The given parameters.
-    weight : float
-        Of the distance to them; 1/s^2 where relative changes of s are expected.
+    so that however well A knows some directions, and badly others, none is lost by rounding. The weight comes down in stages to
+    its value, 1/s^2 where relative changes of s are expected. Rows A, shape (r, p), and what they measure, b, shape (r,), are
+    in units of its standard deviation.
     """
     begin, x = bodies.divergence(bodies.given), bodies.given
     assert begin is not None

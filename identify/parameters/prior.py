@@ -22,16 +22,9 @@ PLAIN = 1e-12  # Share of the largest variance that every combination is taken t
 
 
 def normal_prior(K: Array, values: Array, sigma: Array) -> Prior:
-    """Prior of base parameters K x from standard values with standard deviations, infinite where unknown.
+    """Prior of base parameters K x, K of shape (b, p), from standard values with standard deviations, shape (p,).
 
-    A base parameter of which a part is not known is not known at all.
-
-    Parameters
-    ----------
-    K : Array, shape (b, p)
-        What base parameters are made of.
-    values, sigma : Array, shape (p,)
-        Standard values, and their standard deviations.
+    They are infinite where values are unknown. A base parameter of which a part is not known is not known at all.
     """
     known = np.isfinite(sigma)
     places = (K[:, known] != 0).any(axis=1) & ~(K[:, ~known] != 0).any(axis=1)
@@ -102,16 +95,9 @@ def evident_sizes(R: Array, groups: Sequence[npt.NDArray[np.intp]], sizes: Array
 
         s_k^2 = u_k' u_k / (n_k - tr C_k / s_k^2),   C = (R' R + diag(1 / s^2))^-1,  u_k the n_k parameters of a group
 
-    (a linear mixed model; D. J. C. MacKay, "Bayesian interpolation", Neural Computation 4 (1992) 415-447).
-
-    Parameters
-    ----------
-    R : Array, shape (r, p + 1)
-        Rows of all parameters and of what they make, in units of their noise.
-    groups : sequence of array of int
-        Places of the parameters of each group.
-    sizes : Array, shape (group,)
-        Where the search begins: what a group would be if it made the whole.
+    (a linear mixed model; D. J. C. MacKay, "Bayesian interpolation", Neural Computation 4 (1992) 415-447). R has the rows of
+    all parameters and of what they make, in units of their noise, shape (r, p + 1), groups the places of their parameters. The
+    search begins at sizes, shape (group,): what a group would be if it made the whole.
     """
     least, member = LEAST * sizes, np.repeat(np.arange(len(groups)), [len(group) for group in groups])
 

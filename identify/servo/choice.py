@@ -34,9 +34,8 @@ def residuals_by_state(fit: ServoFit) -> list[ServoLack]:
     loop = fit.loop
     speed = loop.stacked([np.abs(np.gradient(run.clean, run.t)) for run in loop.runs])
     on = loop.stacked([run.enabled.astype(float) for run in loop.runs]) > 0.5
-    duty = loop.stacked(
-        [run.servo.slope * np.abs(run.command - run.clean) / run.servo.limit for run in loop.runs]
-    )  # of the command, not of its target: what matters is whether the joint is near it
+    # Of the command, not of its target: what matters is whether the joint is near it.
+    duty = loop.stacked([run.servo.slope * np.abs(run.command - run.clean) / run.servo.limit for run in loop.runs])
     moving, full = speed > SLOW * fit.excitation.speed, duty > 1
     r = np.abs(fit.found.residual)
     kinds = {

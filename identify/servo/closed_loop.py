@@ -36,14 +36,8 @@ WAY = 6  # Ranges of its motion that a joint may cross in a step: beyond, it is 
 class ServoLoop:
     """Runs of one kind of servo, to be simulated with any parameters (see `idbench.identify.servo.servo_step`).
 
-    Parameters
-    ----------
-    runs : sequence of ServoRun
-        What was logged, and what is known of each servo.
-    step : float
-        Longest step [s].
-    count : float
-        Angle to whose multiples positions at rest are rounded [rad], as the servo reports them; 0: none are (see `count_of`).
+    Steps are at most `step` [s]. Positions at rest are rounded to multiples of `count` [rad], as the servo reports them; 0:
+    none are (see `count_of`).
     """
 
     def __init__(self, runs: Sequence[ServoRun], step: float, count: float = 0.0) -> None:
@@ -59,7 +53,6 @@ class ServoLoop:
         commands = np.concatenate([run.command for run in self.runs])
         self._fastest = WAY * (float(np.ptp(self.q[self.kept])) + float(np.ptp(commands)) + 1e-6) / self.h
         self._tracks = [self._track(run) for run in self.runs]
-        self._places = [self._place(run) for run in self.runs]
 
     def stacked(self, signals: Sequence[Array]) -> Array:
         """Signals of the runs, shape (run, sample), each with its last value after its end."""
@@ -90,27 +83,19 @@ class ServoLoop:
 
     def _simulate_run(self, k: int, laws: Sequence[ServoLaw], ahead: Array, out: Array) -> None:
         """Write the positions of a run into `out`, shape (lane, sample)."""
-        from idbench.identify.servo.servo_step import (
-            Firmware,
-            at_samples,
-            motion,
-        )  # its compiler takes longer than many a command
+        # Its compiler takes longer than many a command.
+        from idbench.identify.servo.servo_step import Firmware, at_samples, motion
 
-        (before, share) = self._places[k]
-        begin = self._begin[k]
+        run, begin = self.runs[k], self._begin[k]
         starts = begin.state + ahead * begin.per_angle
-        servo = self.runs[k].servo
+        servo = run.servo
+        steps = (run.t - run.t[0]) / self.h
+        before = steps.astype(np.int64)  # each sample
         firmware = Firmware(servo.slope, servo.kd, servo.limit, servo.speed_limit, servo.count, servo.steps)
         for lane, (law, start) in enumerate(zip(laws, starts.tolist(), strict=True)):
             path = motion(law, firmware, self._tracks[k], tuple(start), self.h, self._fastest)
-            out[lane, : len(before)] = at_samples(path, before, share, self.count)
+            out[lane, : len(before)] = at_samples(path, before, steps - before, self.count)
         out[:, len(before) :] = out[:, len(before) - 1 : len(before)]
-
-    def _place(self, run: ServoRun) -> tuple[npt.NDArray[np.int64], Array]:
-        """Step before each sample, and by how much of a step the sample is later."""
-        x = (run.t - run.t[0]) / self.h
-        before = x.astype(np.int64)
-        return before, x - before
 
     def _track(self, run: ServoRun) -> tuple[Array, ...]:
         from idbench.identify.servo.servo_step import Track

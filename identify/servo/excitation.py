@@ -70,7 +70,9 @@ class Excitation:
         T = float(np.median([run.T for run in runs]))
         speed = float(np.quantile(speeds, 0.99))
         torque = max(float(np.sqrt(np.mean(np.square(loads)))), (inertia + held.get("Ia", 0.0)) * speed / (50 * T))
-        driven = max(run.servo.supply * min(run.servo.limit, _commanded(run)) for run in runs)
+        # Root mean square of what the loop commands for the error of the position.
+        commanded = [run.servo.slope * float(np.sqrt(np.mean((run.command - run.clean) ** 2))) for run in runs]
+        driven = max(run.servo.supply * min(run.servo.limit, x) for run, x in zip(runs, commanded, strict=True))
         torque = max(torque, TYPICAL * held.get("a", 0.0) * driven, held.get("b", 0.0) * speed, held.get("Fs", 0.0))
         if loaded := torque > 0:
             loaded = torque > NOTHING * driven or any(name in held for name in SCALES)
@@ -96,8 +98,3 @@ class Excitation:
 def _saturated(run: ServoRun) -> bool:
     duty = run.servo.slope * np.abs(run.command - run.clean)[run.enabled]
     return bool(duty.size) and bool(np.mean(duty >= run.servo.limit) > 0.98)
-
-
-def _commanded(run: ServoRun) -> float:
-    """Root mean square of what the loop commands for the error of the position."""
-    return float(run.servo.slope * np.sqrt(np.mean((run.command - run.clean) ** 2)))

@@ -32,16 +32,9 @@ class OffsetJoint(NamedTuple):
 
 
 def per_offset(fit: ServoFit, runs: Sequence[ServoRun], other: Sequence[ServoRun]) -> Array:
-    """Derivative of the free parameters by another joint's position offset [rad], shape (p,).
+    """Derivative of the free parameters of a fit by another joint's position offset [rad], shape (p,).
 
-    Parameters
-    ----------
-    fit : ServoFit
-        The fit of one joint.
-    runs : sequence of ServoRun
-        The runs that it looked at.
-    other : sequence of ServoRun
-        The same, with their loads if the offset of the other joint is larger by `APART`.
+    The other runs are those of the fit, with their loads if the offset of the other joint is larger by `APART`.
     """
     with one_thread():
         q, moved = (ServoLoop(runs, fit.loop.h).simulate(fit.p)[0] for runs in (runs, other))
@@ -56,14 +49,8 @@ def together(joints: Mapping[int, OffsetJoint], assumed: Mapping[int, float]) ->
 
     The free parameters of joint j are linear in the offsets o of the others, near those that its loads assume:
     theta_j + B_jk (o_k - assumed_k). Its own offset is one of them, so that the offsets solve a linear system. Where gravity
-    does not tell them apart, fits stay as they are. Joints whose torques have no scale have no part in it.
-
-    Parameters
-    ----------
-    joints : mapping of int to Joint
-        By the number of the joint.
-    assumed : mapping of int to float
-        Offsets [rad].
+    does not tell them apart, fits stay as they are. Joints whose torques have no scale have no part in it. Fits and assumed
+    offsets [rad] are by the number of the joint.
     """
     sources = [k for k in assumed if k in joints and "offset" in joints[k].fit.free]
     own = {k: joints[k].fit.free.index("offset") for k in sources}

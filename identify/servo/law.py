@@ -136,14 +136,9 @@ class Servo:
         return self.gain * self.kp
 
     @property
-    def step(self) -> float:
-        """Angle of one count [rad]."""
-        return 2 * np.pi / self.counts
-
-    @property
     def count(self) -> float:
         """Angle to whose multiples the firmware rounds [rad]; 0: it does not."""
-        return self.step if self.counts < EXACT else 0.0
+        return 2 * np.pi / self.counts if self.counts < EXACT else 0.0
 
     @property
     def held(self) -> dict[str, float]:

@@ -36,16 +36,8 @@ def cross_validate(found: Found, loop: ServoLoop, c: float, parts: int) -> LeftO
     H is the curvature of the objective, S the covariance of its gradient (P. J. Huber, 1967), both those that are left when
     every change of the parameters comes with the best beginnings of the runs. S adds up over runs, or pieces of them, each with
     the residual that it has if it is left out of the fit (CR3: R. M. Bell and D. F. McCaffrey, Survey Methodology 28 (2002)
-    169-181): a fall that alone shows viscous friction is fitted closely whatever the friction is.
-
-    Parameters
-    ----------
-    found, loop
-        A fit and its runs.
-    c : float
-        Scale of Fair's function [rad].
-    parts : int
-        Stretches of time into which each run is cut (see `stretches`).
+    169-181): a fall that alone shows viscous friction is fitted closely whatever the friction is. c is the scale of Fair's
+    function [rad], `parts` the number of stretches of time into which each run is cut (see `stretches`).
     """
     r = found.residual
     size, J, w, free = fair_rows(found, c)
@@ -100,12 +92,8 @@ def stretches(found: Found, loop: ServoLoop, clusters: int) -> int:
     """Number of stretches of each run: enough for so many clusters, no more than correlations allow."""
     r = found.residual
     wanted, least = (int(np.ceil(x / len(r))) for x in (clusters, MIN_CLUSTERS))
-    return max(least, min(wanted, loop.samples // _correlated(r)))
-
-
-def _correlated(r: Array) -> int:
-    """Correlation length of residuals [samples]."""
     power = np.abs(np.fft.rfft(r, 2 * r.shape[1], axis=1)) ** 2
     correlation = np.fft.irfft(power.mean(axis=0))[: r.shape[1]]
     small = np.flatnonzero(correlation < UNCORRELATED * correlation[0])
-    return int(small[0]) if len(small) and small[0] > 0 else 1
+    correlated = int(small[0]) if len(small) and small[0] > 0 else 1
+    return max(least, min(wanted, loop.samples // correlated))

@@ -65,15 +65,7 @@ COLUMNS = ("a", "b", "Ia", "Fs", "offset")
 
 
 class ServoRows:
-    """Rows of runs on one clock each: J qdd + load = a V duty - b qd - Fs sign(qd) - Ia qdd + a V g kp offset.
-
-    Parameters
-    ----------
-    runs : sequence of ServoRun
-        What was logged.
-    held : mapping of str to float
-        Parameters that are known.
-    """
+    """Rows of runs on one clock each: J qdd + load = a V duty - b qd - Fs sign(qd) - Ia qdd + a V g kp offset."""
 
     def __init__(self, runs: Sequence[ServoRun], held: Mapping[str, float]) -> None:
         own = [name for name in COLUMNS[:-1] if name != "b" or "Fv" in held]  # the column of b has all damping

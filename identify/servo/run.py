@@ -16,10 +16,6 @@ from idbench.identify.servo.law import Servo
 PARTS = ("inertia", "sine", "cosine", "rest", "lightness", "shaking")  # Of a load
 
 
-def _none() -> Array:
-    return frozen(np.zeros(()))
-
-
 G = 9.81  # Gravity of a pendulum on a bench [m/s^2]
 
 
@@ -39,9 +35,9 @@ class JointLoad:
     """Torque per cosine of the joint's angle [N m], shape (time,) or ()."""
     rest: Array
     """Torque that does not depend on the angle [N m], shape (time,) or ()."""
-    lightness: Array = field(default_factory=_none)
+    lightness: Array = field(default_factory=lambda: np.zeros(()))
     """Of a simulation (see `TimeSteps`): diagonal of the inverse mass matrix of all joints [1/(kg m^2)], shape (time,)."""
-    shaking: Array = field(default_factory=_none)
+    shaking: Array = field(default_factory=lambda: np.zeros(()))
     """Of a simulation: acceleration by which its dry friction sees the damping of other joints [rad/s^2], shape (time,)."""
     t: Array | None = None
     """Times [s], on the clock of the log, shape (time,); None of a load that is constant."""
@@ -208,15 +204,7 @@ MOVES = 4  # Counts by which a joint moves in a piece that says anything
 
 
 def pieces(run: ServoRun, delay: float) -> list[ServoRun]:
-    """A run in pieces that begin at rest, the target of the firmware where the command is.
-
-    Parameters
-    ----------
-    run : ServoRun
-        What was logged.
-    delay : float
-        By which commands may be late [s].
-    """
+    """A run in pieces that begin at rest, the target of the firmware where the command, late by `delay` [s] at most, is."""
     rest, step = REST + delay, run.still
     t, first = run.t, np.searchsorted(run.t, run.t - rest)
     last = np.searchsorted(run.t, run.t + AFTER, side="right")

@@ -185,8 +185,7 @@ class ServoSearch:
 
     def _steps(self, normal: "_Normal", damping: float) -> Array:
         eye = np.eye(len(normal.size))
-        every = [np.linalg.solve(normal.A + damping * d * eye, normal.gradient) / normal.size for d in DAMPINGS]
-        return np.array(every)
+        return np.array([np.linalg.solve(normal.A + damping * d * eye, normal.gradient) / normal.size for d in DAMPINGS])
 
     def _sample_steps(self, rng: np.random.Generator, normal: "_Normal", spread: float) -> Array:
         size = normal.size

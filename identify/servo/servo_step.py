@@ -137,10 +137,8 @@ def _apart(
     """Speeds of link and rotor, and their gap: each by itself, and as one body where one would leave the play."""
     half = p.backlash / 2
     J = max(of.J, LIGHT * p.Ia)
-    free_link, free_rotor = (
-        link + h / J * of.external,
-        _after(p, firmware, Acting(of.on, 0.0, of.damping, of.push, 0.0, 0.0, 0.0), rotor, h),
-    )
+    free_link = link + h / J * of.external
+    free_rotor = _after(p, firmware, Acting(of.on, 0.0, of.damping, of.push, 0.0, 0.0, 0.0), rotor, h)
     free_gap = gap + h * (free_rotor - free_link)
     if abs(free_gap) <= half:
         return free_link, free_rotor, free_gap

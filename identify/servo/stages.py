@@ -57,14 +57,7 @@ PLAYS = np.array([0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0])  # Backlash that is trie
 class Stages:
     """Stages of a fit: closed-loop simulations with more parameters, and in finer steps, from stage to stage.
 
-    Parameters
-    ----------
-    runs, held
-        As for `identify_servo`.
-    initial : mapping of str to float
-        Parameters of the first stage.
-    cut : bool
-        Whether runs are cut where the joint rests; they have been if not.
+    The first begins at the initial parameters. Runs are to be cut where the joint rests, or have been.
     """
 
     def __init__(

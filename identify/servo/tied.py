@@ -59,9 +59,8 @@ def _with(fit: ServoFit, shared: Mapping[str, float], places: list[int], S: Arra
     p = {**fit.p, **shared}
     held = {name: x for name, x in p.items() if name not in free}
     again = Stages(fit.loop.runs, held, p, cut=False).fit_fine(fit.friction, free, p, fit.contrasts)
-    follow = H[np.ix_(others, places)] @ np.linalg.pinv(
-        _part(H, places), hermitian=True
-    )  # how parameters of the joint follow its motor's
+    # How parameters of the joint follow its motor's.
+    follow = H[np.ix_(others, places)] @ np.linalg.pinv(_part(H, places), hermitian=True)
     C = np.zeros_like(fit.covariance)
     C[np.ix_(places, places)] = S
     C[np.ix_(others, places)] = follow @ S

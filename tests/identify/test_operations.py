@@ -26,17 +26,17 @@ def test_scara_costs_what_its_closed_form_does():
     found = operations(scara(), "power")
     assert found.functions == 2
     assert found.additions == 1
-    assert found.differentiated == 4
+    assert found.derivatives == 4
     explicit, implicit = (operations(scara(), model) for model in ("explicit", "implicit"))
     assert implicit.total < explicit.total
-    assert explicit.differentiated == 0
+    assert explicit.derivatives == 0
 
 
 @pytest.mark.parametrize("robot", ["puma560", "panda"])
 def test_power_costs_a_third_of_the_explicit_model_on_many_joints(robot):
     explicit, implicit, power = (operations(RobotModel(robot).basis, model) for model in ("explicit", "implicit", "power"))
     assert power.total < 0.4 * explicit.total
-    assert explicit.total < implicit.total + implicit.differentiated
+    assert explicit.total < implicit.total + implicit.derivatives
 
 
 LAWS = [name for name in BLOCKS.builtin if isinstance(BLOCKS.create(name), AbstractFriction)]

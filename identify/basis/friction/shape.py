@@ -22,16 +22,12 @@ class Shape(NamedTuple):
 
     setting: str
     """The law's own setting."""
-
     letters: str
     """What it is called; the joint's number, from 1, follows."""
-
     unit: str
     """Its unit."""
-
     start: float
     """Its operating point while nothing is known."""
-
     range: tuple[float, float]
     """Within which it is looked for."""
 

@@ -53,7 +53,7 @@ def simulated(kp: float, seed: int, seconds: float = 8.0, mass: float = MASS) ->
         data.ctrl[0] = u
         mujoco.mj_step(model, data)
     every = round(0.01 / H)
-    counted = np.round(q[::every] / SERVO.step) * SERVO.step
+    counted = np.round(q[::every] / SERVO.count) * SERVO.count
     return ServoRun(t[::every], counted, command_at(t[::every], seed), JointLoad.pendulum(MASS, LENGTH), replace(SERVO, kp=kp))
 
 
@@ -68,8 +68,8 @@ def test_parameters_of_mujocos_servo_are_found(runs: list[ServoRun]) -> None:
     effective = {**TRUTH, "Ia": TRUTH["Ia"] + TRUTH["b"] * H, "delay": DELAY - 1.3 * H}
     for name, true in effective.items():
         assert abs(fit.p[name] - true) < 4 * fit.standard_errors[name] + 0.005 * true, name
-    assert fit.scale < 0.35 * SERVO.step  # rounding alone leaves 0.25
-    assert fit.errors([simulated(24.0, 7)])[0] < 3 * SERVO.step
+    assert fit.scale < 0.35 * SERVO.count  # rounding alone leaves 0.25
+    assert fit.errors([simulated(24.0, 7)])[0] < 3 * SERVO.count
 
 
 def test_command_in_degrees_is_refused(runs: list[ServoRun]) -> None:
@@ -106,7 +106,7 @@ def test_a_joint_without_a_load_is_known_up_to_a_factor(runs: list[ServoRun]) ->
     assert fit.factor[0] < 0.1
     assert fit.factor[1] > 10
     assert fit.p["b"] / fit.p["a"] == pytest.approx(TRUTH["b"] / TRUTH["a"], rel=0.02)
-    assert fit.errors(fit.loop.runs).mean() < 3 * SERVO.step
+    assert fit.errors(fit.loop.runs).mean() < 3 * SERVO.count
 
 
 def test_command_with_the_wrong_sign_is_refused(runs: list[ServoRun]) -> None:

@@ -24,7 +24,7 @@ def simulated(seed: int, load: JointLoad | None = None, **law: float) -> ServoRu
     on = ~(((t > 4) & (t < 5)) | ((t > 9) & (t < 10))) if load is None else None
     run = ServoRun(t, np.linspace(0, 1e-3, len(t)), command, load or JointLoad.pendulum(0.6, 0.12), SERVO, on)
     q = ServoLoop([replace(run, q=0 * t)], 2.5e-4).simulate(LAW | law)[0, 0]
-    return replace(run, q=np.rint(q / SERVO.step) * SERVO.step)
+    return replace(run, q=np.rint(q / SERVO.count) * SERVO.count)
 
 
 @pytest.fixture(scope="module")
@@ -53,7 +53,7 @@ def test_spikes_of_the_bus_are_left_out(run, fit):
 
 def test_a_joint_that_rests_and_flickers_has_no_spikes():
     t = np.arange(0, 1, 0.01)
-    q = SERVO.step * (np.arange(100) % 7 == 0)
+    q = SERVO.count * (np.arange(100) % 7 == 0)
     assert ServoRun(t, q, 0 * t, JointLoad.pendulum(0.6, 0.12), SERVO).read_well.all()
 
 
@@ -141,9 +141,9 @@ def test_a_joint_of_which_the_load_does_not_set_the_scale_says_so():
 
 def test_positions_at_rest_are_whole_counts_where_the_log_has_them(run):
     """What a joint does between counts at rest, no log in counts says."""
-    assert count_of([run]) == SERVO.step
-    assert count_of([replace(run, q=run.q + 0.3 * SERVO.step * np.sin(run.t))]) == 0
-    plain, counted = (ServoLoop([run], 1e-3, count).simulate(LAW)[0, 0] / SERVO.step for count in (0.0, SERVO.step))
+    assert count_of([run]) == SERVO.count
+    assert count_of([replace(run, q=run.q + 0.3 * SERVO.count * np.sin(run.t))]) == 0
+    plain, counted = (ServoLoop([run], 1e-3, count).simulate(LAW)[0, 0] / SERVO.count for count in (0.0, SERVO.count))
     whole = np.isclose(counted, np.rint(counted), rtol=0, atol=1e-9)
     rests = np.append(np.diff(plain) == 0, False)
     assert rests.mean() > 0.2
@@ -220,6 +220,6 @@ def test_a_log_that_begins_in_motion_is_judged_from_where_its_beginning_does_not
     parts = {name: x[moving:] for name in ("t", "q", "command", "on") if (x := getattr(run, name)) is not None}
     late = replace(run, **parts)
     assert 0 < np.argmax(fit.follows([late])[0]) < len(late.t) // 2
-    assert fit.errors([late])[0] < 1.5 * fit.errors([run])[0] + SERVO.step / 4
+    assert fit.errors([late])[0] < 1.5 * fit.errors([run])[0] + SERVO.count / 4
     naive = np.abs(ServoLoop([late], fit.loop.h).simulate(fit.p)[0, 0] - late.q).mean()
     assert naive > 2 * fit.errors([late])[0]
