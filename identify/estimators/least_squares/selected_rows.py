@@ -53,7 +53,7 @@ class SelectedRows(AbstractEstimator):
 def _length(problem: Problem) -> float:
     """Return the length of the windows [s]; 0 of rows that are no integrals, all of which are then selected."""
     operator, fs = problem.own_chain.operator, problem.logs[0].fs
-    return (len(operator.kernels(fs).integral) - 1) / fs if isinstance(operator, AbstractWeakForm) else 0.0
+    return (len(operator.response(fs)) - 1) / fs if isinstance(operator, AbstractWeakForm) else 0.0
 
 
 def selected(W: Array, valid: npt.NDArray[np.bool_], time: Array, log: Array, apart: float) -> npt.NDArray[np.bool_]:
