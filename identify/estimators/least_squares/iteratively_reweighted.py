@@ -11,7 +11,7 @@ from idbench.identify.arrays import TINY, Array, frozen
 from idbench.identify.data.motion_log import MotionLog
 from idbench.identify.errors import require_positive, require_whole
 from idbench.identify.estimators.estimate import Estimate
-from idbench.identify.estimators.estimator import AbstractEstimator, Need
+from idbench.identify.estimators.estimator import AbstractEstimator
 from idbench.identify.estimators.problem import Problem
 from idbench.identify.estimators.simulating.row_products import Kinds, Solved, solve_with, with_weights
 from idbench.identify.estimators.solution import Given
@@ -40,7 +40,6 @@ class IterativelyReweighted(AbstractEstimator):
     """
 
     acronym: ClassVar[str] = "IRLS"
-    needs: ClassVar[frozenset[Need]] = frozenset({"rows"})
 
     tuning: float = 4.685
     """Standard deviations from which on a row has no part; 4.685 loses 5 % where errors are normal."""

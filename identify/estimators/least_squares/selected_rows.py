@@ -9,7 +9,7 @@ import numpy.typing as npt
 from idbench.identify.arrays import Array, frozen
 from idbench.identify.errors import require_positive
 from idbench.identify.estimators.estimate import Estimate
-from idbench.identify.estimators.estimator import AbstractEstimator, Need
+from idbench.identify.estimators.estimator import AbstractEstimator
 from idbench.identify.estimators.problem import Problem
 from idbench.identify.estimators.simulating.row_products import with_weights
 from idbench.identify.estimators.solution import Given
@@ -29,7 +29,6 @@ class SelectedRows(AbstractEstimator):
     """
 
     acronym: ClassVar[str] = "OLS"
-    needs: ClassVar[frozenset[Need]] = frozenset({"rows"})
 
     apart: float | None = None
     """Minimum time between selected rows [s]; by default the length of a window."""

@@ -60,10 +60,6 @@ class Solved:
         """Standard deviations of X, shape (..., p)."""
         return np.sqrt(np.diagonal(self.covariance, axis1=-2, axis2=-1))
 
-    def covariance_by(self, weight: Array) -> Array:
-        """Return the covariance of X if residuals times these weights, shape (..., r), are independent and alike."""
-        return _covariance(self.G, self.residual, weight)
-
     def where(self, active: npt.NDArray[np.bool_], before: "Solved") -> "Solved":
         """Return this solution in the runs that are active, and that before in the others."""
         pairs = [(getattr(self, x), getattr(before, x)) for x in ("X", "G", "residual", "covariance")]
@@ -82,27 +78,24 @@ def solve_with(kinds: Kinds, Y: Array, W: Array, Z: Array) -> Solved:
     W, Z : Array, shape (..., r, p)
         Regressors and instruments; those of least squares are the regressors.
     """
-    found = _solved(Y, W, Z, kinds.own)
+    found = with_weights(Y, W, kinds.own, Z)
     for _ in range(ROUNDS):
-        found = _solved(Y, W, Z, kinds.weights(found.residual))
+        found = with_weights(Y, W, kinds.weights(found.residual), Z)
     return found
 
 
-def with_weights(Y: Array, W: Array, weight: Array) -> Solved:
-    """Return the least-squares solution of rows multiplied by weights, shape (..., r)."""
-    return _solved(Y, W, W, weight)
-
-
-def _solved(Y: Array, W: Array, Z: Array, weight: Array) -> Solved:
-    weighted = Z * (weight**2)[..., None]
+def with_weights(Y: Array, W: Array, weight: Array, Z: Array | None = None) -> Solved:
+    """Return X = (Z' w^2 W)^-1 Z' w^2 Y for weights w, shape (..., r); by default Z is W: least squares."""
+    weighted = (W if Z is None else Z) * (weight**2)[..., None]
     inverse = _inverse(np.matmul(np.swapaxes(weighted, -1, -2), W))
     G = np.matmul(weighted, np.swapaxes(inverse, -1, -2))
     X = np.sum(G * Y[..., None], axis=-2)
     residual = Y - np.matmul(W, X[..., None])[..., 0]
-    return Solved(X, G, residual, _covariance(G, residual, weight))
+    return Solved(X, G, residual, covariance_by(weight, G, residual))
 
 
-def _covariance(G: Array, residual: Array, weight: Array) -> Array:
+def covariance_by(weight: Array, G: Array, residual: Array) -> Array:
+    """Covariance of X = G' Y if residuals times weights, shape (..., r), are independent and alike, shape (..., p, p)."""
     freedom = np.maximum(np.sum(weight > 0, axis=-1) - G.shape[-1], 1)
     variance = np.sum((residual * weight) ** 2, axis=-1) / freedom
     white = G / np.where(weight > 0, weight, np.inf)[..., None]

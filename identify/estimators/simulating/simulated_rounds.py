@@ -11,10 +11,10 @@ from idbench.identify.arrays import Array, frozen
 from idbench.identify.data.motion_log import MotionLog
 from idbench.identify.errors import IdentificationError, require_positive, require_whole
 from idbench.identify.estimators.estimate import Estimate
-from idbench.identify.estimators.estimator import AbstractEstimator
+from idbench.identify.estimators.estimator import AbstractEstimator, Need
 from idbench.identify.estimators.problem import Problem
 from idbench.identify.estimators.simulating.row_products import Solved
-from idbench.identify.estimators.simulator import AbstractLoop, Simulated
+from idbench.identify.estimators.simulator import Simulated
 from idbench.identify.estimators.solution import AbstractSolution
 from idbench.identify.iterate import by_run, iterate, not_converged
 from idbench.identify.models import ExplicitModel
@@ -164,7 +164,9 @@ class Rounds:
         In the first round the controller knows the robot, so that it follows the motion, however far off the start is.
         """
         self._informed = not self.simulations.any()
-        found = loop_of(self.problem).repeat(np.nan_to_num(X), informed=self._informed, exact=self.exact)
+        loop = self.problem.simulation.loop
+        assert loop is not None  # an estimator says that it needs one
+        found = loop.repeat(np.nan_to_num(X), informed=self._informed, exact=self.exact)
         extra = X.ndim - 1 - self.simulations.ndim
         for place, why in found.failures.items():
             if self.active[place[extra:]]:  # one that has converged stays
@@ -220,6 +222,7 @@ class Rounds:
 class AbstractSimulating(AbstractEstimator):
     """An estimator that simulates the robot in rounds."""
 
+    needs: ClassVar[frozenset[Need]] = frozenset({"rows", "loop"})
     begins: ClassVar[bool] = True
 
     rounds: int = 15
@@ -251,13 +254,6 @@ def starting_point(problem: Problem) -> Array:
         return problem.scaled_factors.fit(2).X
     shape = *problem.factors.together.status.shape, len(problem.names)
     return np.broadcast_to(problem.simulation.start, shape).astype(np.float64)
-
-
-def loop_of(problem: Problem) -> AbstractLoop:
-    """Return the closed loop of a problem; raise IdentificationError if it has none."""
-    if problem.simulation.loop is None:
-        raise IdentificationError("the closed loop of the log is not known: give the scenario that simulates it (--loop)")
-    return problem.simulation.loop
 
 
 def rates(problem: Problem) -> list[tuple[slice, float]]:
