@@ -154,14 +154,9 @@ def split_by_log(x: Array, parts: Sequence[LogRows], axis: int = 0) -> list[Arra
 
 
 def noise_covariance(problem: "Problem", influence: Sequence[Array]) -> Array:
-    """Return the covariance that the noise of a problem's logs gives an estimate X = G' Y, shape (..., p, p).
+    """Covariance that the noise of a problem's logs gives an estimate X = G' Y, shape (..., p, p).
 
-    Parameters
-    ----------
-    problem : Problem
-        Logs and rows.
-    influence : sequence of Array, shape (..., r, p)
-        G of each of its parts.
+    G of each of its parts has shape (..., r, p).
     """
     each = zip(problem.parts, influence, strict=True)
     return sum((part.covariance.of_sums(G) for part, G in each), start=np.zeros(())) / problem.share

@@ -54,18 +54,11 @@ SURE = 4.0  # Speed over the noise of the velocity at which a joint is certain t
 
 
 def unbiased(rows: Rows, noisier: Rows) -> Rows:
-    """Return the rows of one log with W less what noise of the positions adds to it on average.
+    """Return the rows of one log with W less what noise of the positions adds to it, by those of `with_more_noise`.
 
     Columns hold squares of velocities and sines of positions, so that noise does not average out of them. More noise n of the
     same size, put in with either sign, shows how much: W(q + n) + W(q - n) - 2 W(q) holds the squares alone, and its half is,
     on average, what the log's own noise has added. (One noise is enough: only its squares are left to chance.)
-
-    Parameters
-    ----------
-    rows : Rows
-        Of one log.
-    noisier : Rows
-        Those of `with_more_noise`.
     """
     return replace(rows, W=2 * rows.W - np.mean(noisier.W, axis=0))
 
@@ -99,18 +92,8 @@ MIN_RATIO, MAX_RATIO = 0.01, 10.0
 def friction_bias(to_rows: RowMap, linear: Linearization, model: AbstractModel, position: Array) -> Array:
     """Bias of W X by noise of the velocities where joints hardly move, shape (..., r).
 
-    Friction turns noise into power, Fs |qd|, of one sign: that of a velocity of E|qd + noise| - |qd|.
-
-    Parameters
-    ----------
-    to_rows : RowMap
-        Of one log.
-    linear : Linearization
-        Of the explicit model, about its signals: basis and X.
-    model : AbstractModel
-        Whose rows they are.
-    position : Array, shape (..., joint)
-        Standard deviation of the positions' noise [rad].
+    Friction turns noise into power, Fs |qd|, of one sign: that of a velocity of E|qd + noise| - |qd|. `position` is the
+    standard deviation of the positions' noise [rad], shape (..., joint).
     """
     signals = to_rows.signals
     speed = rectified(smoothed(signals.state.qd, signals.fs), position[..., None] * signals.gain)

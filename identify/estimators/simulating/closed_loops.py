@@ -87,17 +87,6 @@ def gauss_newton(problem: Problem, rounds: Rounds, output: Output, kinds: Kinds)
 
     Each round simulates all p + 1 robots at once. A step that makes the residuals grow is halved. The first is one of least
     squares of the torques on the simulated rows, for which a start may be far off.
-
-    Parameters
-    ----------
-    problem : Problem
-        What is solved.
-    rounds : Rounds
-        How long.
-    output : callable
-        What is compared.
-    kinds : Kinds
-        Which residuals have the same variance.
     """
     measured, h = output(problem.logs), small_steps(problem)
     X = rounds.start()

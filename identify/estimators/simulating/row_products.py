@@ -69,14 +69,7 @@ class Solved:
 def solve_with(kinds: Kinds, Y: Array, W: Array, Z: Array) -> Solved:
     """Return X = (Z' w^2 W)^-1 Z' w^2 Y, weights w from the residuals of the solution before, twice.
 
-    Parameters
-    ----------
-    kinds : Kinds
-        Which rows have residuals of the same variance.
-    Y : Array, shape (..., r)
-        Measurements.
-    W, Z : Array, shape (..., r, p)
-        Regressors and instruments; those of least squares are the regressors.
+    Y has shape (..., r), regressors W and instruments Z have (..., r, p); those of least squares are the regressors.
     """
     found = with_weights(Y, W, kinds.own, Z)
     for _ in range(ROUNDS):
@@ -128,16 +121,8 @@ def scatter(found: Solved, kinds: Kinds, logs: Sequence[tuple[slice, float]]) ->
 
     G' C G with C the covariance of residuals as their autocorrelation says, tapered to zero over `MEMORY` (W. K. Newey and
     K. D. West, "A simple, positive semi-definite, heteroskedasticity and autocorrelation consistent covariance matrix",
-    Econometrica 55 (1987) 703-708): for estimators whose residuals the noise of the log reaches through a closed loop.
-
-    Parameters
-    ----------
-    found : Solved
-        G and residuals.
-    kinds : Kinds
-        Which residuals have the same variance.
-    logs : sequence of (slice, float)
-        Which residuals are those of each log, and how many instants [1/s] they have.
+    Econometrica 55 (1987) 703-708): for estimators whose residuals the noise of the log reaches through a closed loop. `logs`
+    has the residuals of each log, and their instants per second [1/s].
     """
     own = kinds.own > 0
     total = np.zeros(found.covariance.shape)
