@@ -16,7 +16,7 @@ from idbench.identify.noise.propagation import NoisyRows
 from idbench.identify.noise.row_weights import friction_bias, reciprocal_root, unbiased, with_more_noise
 from idbench.identify.rows.chain import Chain
 from idbench.identify.rows.factors import Factor, triangular
-from idbench.identify.rows.rows import Rows, piece_of
+from idbench.identify.rows.rows import Rows
 from idbench.identify.signals.signals import Signals
 
 if TYPE_CHECKING:
@@ -195,7 +195,7 @@ def pieces(chain: Chain, logs: Sequence[MotionLog]) -> list[Piece]:
     """Return every piece of logs, each with the chain whose mask is suited to the whole log."""
     suited = [_suited(chain, log) for log in logs]
     each = zip(suited, logs, strict=True)
-    return [(own, log, piece) for own, log in each for piece in own.pieces(log, piece_of(log))]
+    return [(own, log, piece) for own, log in each for piece in own.pieces(log)]
 
 
 def bias_counts(parts: Sequence[LogRows], names: tuple[str, ...], share: float) -> bool:

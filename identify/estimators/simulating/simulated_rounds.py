@@ -259,7 +259,8 @@ def starting_point(problem: Problem) -> Array:
 def rates(problem: Problem) -> list[tuple[slice, float]]:
     """Rows of each log, and their rate [1/s]."""
     maps = problem.rows.maps
-    return [(problem.rows.of_log(k), part.signals.fs / part.grid.step) for k, part in enumerate(maps)]
+    ends = np.cumsum([part.rows for part in maps]).tolist()
+    return [(slice(end - part.rows, end), part.signals.fs / part.grid.step) for part, end in zip(maps, ends, strict=True)]
 
 
 def small_steps(problem: Problem) -> Array:
