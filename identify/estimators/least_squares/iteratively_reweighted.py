@@ -57,7 +57,8 @@ class IterativelyReweighted(AbstractEstimator):
         Y, W = rows.Y * kinds.own, rows.W * kinds.own[..., None]
         begin = solve_with(kinds, rows.Y, rows.W, rows.W)
         begin = replace(begin, residual=begin.residual * kinds.own)
-        weights = _Weights.start(kinds, begin.residual, self.tuning, _relative(clean, kinds), _least(Y, kinds))
+        least = np.maximum(EXACT * np.sqrt(np.mean(kinds.by_kind(Y) ** 2, axis=-2)), TINY)
+        weights = _Weights.start(kinds, begin.residual, self.tuning, _relative(clean, kinds), least)
 
         def step(before: Solved) -> tuple[Solved, npt.NDArray[np.bool_]]:
             nonlocal weights
@@ -152,11 +153,6 @@ def _relative(problem: Problem, kinds: Kinds) -> Array:
     size = kinds.by_kind(np.sqrt(np.nan_to_num(variance)) * kinds.own)
     typical = _spread(size, kinds.by_kind(kinds.own) > 0)[..., None, :] / SIGMA
     return np.maximum(np.where(typical > 0, size / typical, 1.0), MIN_DEVIATION)
-
-
-def _least(Y: Array, kinds: Kinds) -> Array:
-    """Least noise, shape (..., kind): a share of the measurements' rms."""
-    return np.maximum(EXACT * np.sqrt(np.mean(kinds.by_kind(Y) ** 2, axis=-2)), TINY)
 
 
 def _tukey(x: Array, tuning: float) -> Array:
