@@ -70,12 +70,7 @@ def left_out(products: Array, known: Array | None = None) -> Array:
 
         X_b = (A - A_b)^-1 (c - c_b),   A_b = W_b' W_b,   c_b = W_b' Y_b   of rows made independent.
 
-    Parameters
-    ----------
-    products : Array, shape (stretch, p + 1, p + 1)
-        Those of [W_b Y_b].
-    known : Array, shape (m, p + 1), optional
-        Rows of what is known before, which are never left out.
+    Products are those of [W_b Y_b], shape (stretch, p + 1, p + 1); `known`, rows of shape (m, p + 1), are never left out.
     """
     every = products.sum(axis=0) + (0.0 if known is None else known.T @ known)
     return solved(np.concatenate([every - products, every[None]]), every)

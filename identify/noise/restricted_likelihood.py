@@ -67,16 +67,8 @@ def likely(
 ) -> Array:
     """Return the numbers, not below `least`, shape (..., i), with which C = sum of number_i C_i makes rows most likely.
 
-    Parameters
-    ----------
-    units : sequence of sequence of BandMatrix
-        C_i, log by log.
-    joined : sequence of Array, shape (..., r, p + 1)
-        [W Y], log by log.
-    start, least : Array, shape (..., i)
-        Where to begin, and where to end.
-    held : Array, shape (..., k), optional
-        Numbers of the C_i after those, which stay.
+    C_i are `units`, [W Y], of shape (..., r, p + 1), is `joined`, both log by log. The numbers of the C_i after those are
+    `held`, shape (..., k), optional.
     """
     held = np.zeros((*start.shape[:-1], 0)) if held is None else held
     number = count()

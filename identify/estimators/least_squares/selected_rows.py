@@ -58,16 +58,8 @@ def _length(problem: Problem) -> float:
 def selected(W: Array, valid: npt.NDArray[np.bool_], time: Array, log: Array, apart: float) -> npt.NDArray[np.bool_]:
     """Mask of the selected rows, shape (r,), by the greedy step k = argmax w_k' M^-1 w_k of `SelectedRows`.
 
-    Parameters
-    ----------
-    W : Array, shape (r, p)
-        Rows.
-    valid : array, shape (r,)
-        Rows that may be selected.
-    time, log : Array, shape (r,)
-        Instant [s], and number of the log, of every row.
-    apart : float
-        Minimum time between selected samples [s]; the rows of one sample are selected one by one.
+    Rows W, shape (r, p), may be selected where they are valid; `time` is their instant [s], and `log` the number of their log,
+    shape (r,). The rows of one sample are selected one by one.
     """
     gaps = np.diff(time)[(np.diff(log) == 0) & (np.diff(time) > 0)]
     if not len(gaps) or gaps.min() >= apart * (1 - 1e-9):

@@ -48,12 +48,7 @@ class SecantSteps:
     def taken(self, X: Array, G: Array, unit: Array) -> tuple[Array, Array]:
         """Return an upper bound of the remaining distance [units], shape (...), and the start of the next step, shape (..., p).
 
-        Parameters
-        ----------
-        X, G : Array, shape (..., p)
-            Parameters before and after the round.
-        unit : Array, shape (..., p)
-            What a step counts in, such as sigma.
+        X and G are the parameters before and after the round; a step counts in `unit`, such as sigma, shape (..., p) each.
         """
         before, self._before = self._before, (X, G)
         step = (G - X) / unit
