@@ -103,21 +103,8 @@ class Rounds:
     def until_settled(self, step: Callable[[Array], Solved], X: Array, steps: SecantSteps | None = None) -> Solved:
         """Return the solution of `step` that does not move any more; runs that have converged are left as they are.
 
-        A round whose controller was made for the simulated robot is not the last: the real one was not.
-
-        Parameters
-        ----------
-        step : callable
-            Makes a round from parameters, shape (..., p).
-        X : Array, shape (..., p)
-            Where it begins.
-        steps : SecantSteps, optional
-            Remaining distance and start of the next step; by default the move and the end of the last one.
-
-        Raises
-        ------
-        IdentificationError
-            If every run fails; the reason of the first.
+        A round whose controller was made for the simulated robot is not the last: the real one was not. It begins at X, shape
+        (..., p). By default, remaining distance and start of the next step are the move and the end of the last one.
         """
         found: Solved | None = None
         move = np.full(X.shape, np.inf)
