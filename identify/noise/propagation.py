@@ -87,7 +87,8 @@ def torque_paths(rows: RowMap) -> Paths:
     over the little that they look at.
     """
     signals = rows.signals
-    windows, grid, places, _ = _thinned([signals.torque_adjoint(np.pad(rows.response, signals.reach))], rows)
+    reach = ceil((signals.prefilter.halo(signals.fs) + signals.torque.halo()) * signals.fs - 1e-9)
+    windows, grid, places, _ = _thinned([signals.torque_adjoint(np.pad(rows.response, reach))], rows)
     inside = between_samples(rows.inside, places)
     torques = np.zeros((*inside.shape[:-1], signals.log.n, inside.shape[-1]))
     for (row, joint), B in rows.B.items():
