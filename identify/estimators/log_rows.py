@@ -214,6 +214,5 @@ def bias_counts(parts: Sequence[LogRows], names: tuple[str, ...], share: float) 
 
 def _suited(chain: Chain, log: MotionLog) -> Chain:
     """The chain with prefilter and mask that suit a whole log, without anything else that its signals keep."""
-    prefilter = chain.suited_prefilter(log)
-    q = prefilter.apply(np.ascontiguousarray(np.swapaxes(log.q, -1, -2)), log.fs)
-    return replace(chain, prefilter=prefilter, mask=chain.mask.suited(chain.differentiator.derivative(q, log.fs)))
+    signals = chain.signals(log)
+    return replace(chain, prefilter=signals.prefilter, mask=chain.mask.suited(signals.state.qd))

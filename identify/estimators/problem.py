@@ -27,11 +27,6 @@ from idbench.identify.signals.signals import Signals
 ROUNDING = 1e-9  # Share by which frequencies may differ that are the same: of a file they are the mean of its steps
 
 
-def same_form(one: MotionLog, other: MotionLog) -> bool:
-    """True if two logs have the same samples, joints and, but for rounding, frequency."""
-    return one.q.shape[-2:] == other.q.shape[-2:] and abs(one.fs / other.fs - 1) < ROUNDING
-
-
 def require_logs(logs: Sequence[object]) -> None:
     """Raise LogError unless all are logs, of which there is one at least."""
     if not logs:
@@ -257,7 +252,9 @@ class Problem:
         self.require_rows("rows at another log need those of this one, and ")
         logs = [log] if isinstance(log, MotionLog) else list(log)
         require_logs(logs)
-        if len(logs) != len(self.logs) or not all(map(same_form, logs, self.logs)):
+        pairs = zip(logs, self.logs, strict=False)
+        alike = (a.q.shape[-2:] == b.q.shape[-2:] and abs(a.fs / b.fs - 1) < ROUNDING for a, b in pairs)
+        if len(logs) != len(self.logs) or not all(alike):
             raise LogError(
                 "rows at other logs need one log for each of the problem's, of the same length, frequency and joints"
             )
