@@ -31,15 +31,7 @@ class RangeError(SettingError):
 
 
 class ExcitationError(IdentificationError):
-    """A motion that does not show every parameter.
-
-    Parameters
-    ----------
-    message : str
-        The message.
-    hidden : tuple of str
-        Parameters that, left out, leave some that the motion does show.
-    """
+    """A motion that does not show every parameter; without those that are `hidden` it shows all that remain."""
 
     def __init__(self, message: str, hidden: tuple[str, ...] = ()) -> None:
         super().__init__(message)

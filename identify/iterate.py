@@ -66,7 +66,7 @@ GOLDEN = (3 - sqrt(5)) / 2  # Share of an interval at which a golden section div
 
 
 def minimum(f: Callable[[float], float], low: float, high: float, xtol: float) -> float:
-    """Minimum of a function of one number between two.
+    """Minimum of a function of one number, which has one minimum between `low` and `high`, to `xtol`.
 
     R. P. Brent, Algorithms for Minimization without Derivatives, Prentice-Hall 1973, chapter 5: through the best three points,
     x, w and v, goes a parabola, whose lowest point is
@@ -75,15 +75,6 @@ def minimum(f: Callable[[float], float], low: float, high: float, xtol: float) -
 
     where that would leave the interval, or steps do not halve, a golden section is taken. (`scipy.optimize` has the same and
     takes 0.15 s to load, more than a search.)
-
-    Parameters
-    ----------
-    f : callable
-        The function, with one minimum between the two.
-    low, high : float
-        Ends of the interval.
-    xtol : float
-        How near the minimum the result is.
     """
     x = w = v = low + GOLDEN * (high - low)
     fx = fw = fv = f(x)

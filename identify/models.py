@@ -5,7 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from math import ceil
-from typing import ClassVar, final
+from typing import final
 
 import numpy as np
 
@@ -103,12 +103,15 @@ def torque_rows(B: Multipliers, signals: Signals) -> Array:
 class AbstractModel(ABC):
     """An identification model B tau = [c + s e] X with s = d/dt: it takes B, c and e from a basis, and never filters."""
 
-    integrated: ClassVar[bool] = False
-    """Whether its rows are integrals over windows, by whatever operator the chain has."""
+    integrated: bool = False
+    """Whether its rows are integrals over windows [ta, tb] of the chain's operator, or of 0.1 s where that makes none."""
 
-    @abstractmethod
     def B(self, state: State) -> Multipliers:
-        """B, by which torques are multiplied, (row of an instant, joint) -> (..., time) or a constant, where it is not 0."""
+        """B, by which torques are multiplied, (row of an instant, joint) -> (..., time) or a constant, where it is not 0.
+
+        By default 1, in a row for each joint.
+        """
+        return {(j, j): 1.0 for j in range(state.n)}
 
     @abstractmethod
     def c(self, basis: Basis, state: State) -> Columns:
@@ -133,18 +136,9 @@ def rows_per_sample(model: AbstractModel, n: int) -> int:
     return 1 + max(row for row, _ in model.B(State(still, still, lambda x: x)))
 
 
-def each_joint(state: State) -> Multipliers:
-    """Return B of a model that has the torque of every joint in a row of its own."""
-    return {(j, j): 1.0 for j in range(state.n)}
-
-
 @dataclass(frozen=True)
 class ExplicitModel(AbstractModel):
     """Explicit dynamic model, tau = D(q, qd, qdd) X (Eq. 5, 6)."""
-
-    def B(self, state: State) -> Multipliers:
-        """Return ones: a row for each joint."""
-        return each_joint(state)
 
     def c(self, basis: Basis, state: State) -> Columns:
         """Return D(q, qd, qdd)."""
@@ -159,9 +153,7 @@ class ExplicitModel(AbstractModel):
 class ImplicitModel(AbstractModel):
     """Implicit dynamic model, tau = [R(q, qd) + s M_i(q) qd] X (Eq. 7-9)."""
 
-    def B(self, state: State) -> Multipliers:
-        """Return ones: a row for each joint."""
-        return each_joint(state)
+    integrated: bool = False
 
     def c(self, basis: Basis, state: State) -> Columns:
         """Return R(q, qd)."""
@@ -176,6 +168,8 @@ class ImplicitModel(AbstractModel):
 class PowerModel(AbstractModel):
     """Power model, qd' tau = [qd' Gamma_f + s h(q, qd)] X (Eq. 10, 23); over windows, the energy model (Eq. 11, 20)."""
 
+    integrated: bool = False
+
     def B(self, state: State) -> Multipliers:
         """Return qd': one row."""
         return {(0, j): state.qd[..., j, :] for j in range(state.n)}
@@ -189,36 +183,14 @@ class PowerModel(AbstractModel):
         return basis.energy(state)
 
 
-@dataclass(frozen=True)
-class OverWindows(AbstractModel):
-    """Another model, integrated over windows [ta, tb] of the chain's operator, or of 0.1 s where that makes no integrals."""
-
-    integrated: ClassVar[bool] = True
-
-    of: AbstractModel
-    """The model."""
-
-    def B(self, state: State) -> Multipliers:
-        """B of the other model."""
-        return self.of.B(state)
-
-    def c(self, basis: Basis, state: State) -> Columns:
-        """Return the other model's columns, to be integrated."""
-        return self.of.c(basis, state)
-
-    def e(self, basis: Basis, state: State) -> Columns:
-        """Return the other model's columns whose differences over a window are taken."""
-        return self.of.e(basis, state)
-
-
-def energy() -> OverWindows:
+def energy() -> PowerModel:
     """Energy model, int qd' tau dt = [int qd' Gamma_f dt + h(tb) - h(ta)] X (Eq. 11, 20): power over windows."""
-    return OverWindows(PowerModel())
+    return PowerModel(integrated=True)
 
 
-def integral() -> OverWindows:
+def integral() -> ImplicitModel:
     """Integral of the implicit model, int tau dt = [int R dt + M_i qd (tb) - M_i qd (ta)] X (after Eq. 9)."""
-    return OverWindows(ImplicitModel())
+    return ImplicitModel(integrated=True)
 
 
 THREE = ("explicit", "implicit", "power")  # The paper's models, which are compared where no other is asked for

@@ -12,6 +12,7 @@ Listener = Callable[[str], None]
 
 _listener: ContextVar[Listener | None] = ContextVar("listener", default=None)
 _within: ContextVar[tuple[str, ...]] = ContextVar("within", default=())
+_controller = cache(ThreadpoolController)
 
 
 @contextmanager
@@ -41,8 +42,3 @@ def one_thread() -> Iterator[None]:
     """Keep BLAS to one thread, whatever it is set to: results are then the same on every machine, too."""
     with _controller().limit(limits=1):
         yield
-
-
-@cache
-def _controller() -> ThreadpoolController:
-    return ThreadpoolController()

@@ -16,9 +16,7 @@ from idbench.identify.estimators.least_squares.recursive_least_squares import Re
 from idbench.identify.estimators.least_squares.selected_rows import SelectedRows as SelectedRows
 from idbench.identify.estimators.least_squares.total_least_squares import TotalLeastSquares as TotalLeastSquares
 from idbench.identify.estimators.likelihood.kalman_filter import UnscentedKalmanFilter as UnscentedKalmanFilter
-from idbench.identify.estimators.likelihood.maximum_likelihood import (
-    MaximumLikelihood as MaximumLikelihood,
-)
+from idbench.identify.estimators.likelihood.maximum_likelihood import MaximumLikelihood as MaximumLikelihood
 from idbench.identify.estimators.likelihood.maximum_likelihood import with_delay, with_reversals
 from idbench.identify.estimators.problem import Problem as Problem
 from idbench.identify.estimators.simulating.closed_loops import ClosedLoopInputError as ClosedLoopInputError

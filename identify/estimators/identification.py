@@ -147,17 +147,7 @@ def attempt_each(
 
 
 def estimate(problem: Problem, estimator: AbstractEstimator, *, throw: bool = True) -> Estimate:
-    """Return the estimate of a problem.
-
-    Parameters
-    ----------
-    problem : Problem
-        Logs, robot, model.
-    estimator : AbstractEstimator
-        How it is solved.
-    throw : bool
-        Raise if a run cannot be solved; otherwise `status` reports it.
-    """
+    """Return the estimate of a problem; with `throw`, raise if a run cannot be solved, otherwise `status` reports it."""
     _require(estimator, AbstractEstimator, 'an estimator, such as ESTIMATORS.create("OLS")')
     with one_thread(), blamed():
         estimator.require(problem)

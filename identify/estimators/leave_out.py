@@ -70,12 +70,7 @@ def left_out(products: Array, known: Array | None = None) -> Array:
 
         X_b = (A - A_b)^-1 (c - c_b),   A_b = W_b' W_b,   c_b = W_b' Y_b   of rows made independent.
 
-    Parameters
-    ----------
-    products : Array, shape (stretch, p + 1, p + 1)
-        Those of [W_b Y_b].
-    known : Array, shape (m, p + 1), optional
-        Rows of what is known before, which are never left out.
+    Products are those of [W_b Y_b], shape (stretch, p + 1, p + 1); `known`, rows of shape (m, p + 1), are never left out.
     """
     every = products.sum(axis=0) + (0.0 if known is None else known.T @ known)
     return solved(np.concatenate([every - products, every[None]]), every)
@@ -99,20 +94,8 @@ def moved(parts: Sequence[LogRows], X: Array, influence: Sequence[Array]) -> Arr
         X_b - X = -(I - g_b' w_b)^-1 g_b' e_b,   g = L' G,   [w e] = L^-1 [W Y - W X],   L L' being the covariance of the rows.
 
     Noise of positions is differentiated: sums of rows over a stretch then have it at the ends alone, and a covariance from
-    stretches of such rows would be several times too large.
-
-    Parameters
-    ----------
-    parts : sequence of LogRows
-        Rows of the estimate. Leading axes are runs.
-    X : Array, shape (..., p)
-        The estimate.
-    influence : sequence of Array, shape (..., r, p)
-        G of each part.
-
-    Returns
-    -------
-    Array, shape (stretch, ..., p)
+    stretches of such rows would be several times too large. X has shape (..., p), the G of each part (..., r, p), the result
+    (stretch, ..., p); leading axes are runs.
     """
     stretches, found = Stretches.of(parts), list[Array]()
     one = (1 + RIDGE) * np.eye(X.shape[-1])
@@ -144,20 +127,7 @@ class ModelError:
         Residuals of real robots are correlated over 0.2 to 3 s and have effects of any size; J contains noise, too. So of each
         parameter the larger counts: max(0, J - N) is added to the variance N of noise, with the correlations of J. (Fits of
         single logs agree within two sigma in 94 % on a UR10e, 97 % on a Baxter, 100 % on a KR300, by noise alone in 32, 64 and
-        41 %.)
-
-        Parameters
-        ----------
-        parts : sequence of LogRows
-            Rows of the estimate.
-        X : Array, shape (..., p)
-            The estimate.
-        influence : sequence of Array, shape (..., r, p)
-            G of each part.
-        whole : float
-            Share of all rows that the parts make.
-        noise : Array, shape (..., p)
-            Variance of X due to noise.
+        41 %.) The parts make the share `whole` of all rows; N has shape (..., p), the others are those of `moved`.
         """
         without = moved(parts, X, influence)
         J = jackknife(without) / whole
@@ -184,14 +154,7 @@ def between_logs(parts: Sequence[LogRows], solution: OfWeightedRows | OfWhitened
         tau^2 = max(0, (Q - (k - 1)) / (sum w - sum w^2 / sum w))
 
     (R. DerSimonian and N. Laird, "Meta-analysis in clinical trials", Controlled Clinical Trials 7 (1986) 177-188). An estimate
-    from one log is off by C_i + tau^2, that of k logs together by C + tau^2 / k.
-
-    Parameters
-    ----------
-    parts : sequence of LogRows
-        Rows of each log of a single run.
-    solution : OfWeightedRows or OfWhitenedRows
-        Of all of them.
+    from one log is off by C_i + tau^2, that of k logs together by C + tau^2 / k. The parts are logs of a single run.
     """
     names, precision = parts[0].rows.names, np.linalg.pinv(solution.inverse, hermitian=True)
     X, C = list[Array](), list[Array]()

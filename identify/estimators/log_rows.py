@@ -16,7 +16,7 @@ from idbench.identify.noise.propagation import NoisyRows
 from idbench.identify.noise.row_weights import friction_bias, reciprocal_root, unbiased, with_more_noise
 from idbench.identify.rows.chain import Chain
 from idbench.identify.rows.factors import Factor, triangular
-from idbench.identify.rows.rows import Rows, piece_of
+from idbench.identify.rows.rows import Rows
 from idbench.identify.signals.signals import Signals
 
 if TYPE_CHECKING:
@@ -154,14 +154,9 @@ def split_by_log(x: Array, parts: Sequence[LogRows], axis: int = 0) -> list[Arra
 
 
 def noise_covariance(problem: "Problem", influence: Sequence[Array]) -> Array:
-    """Return the covariance that the noise of a problem's logs gives an estimate X = G' Y, shape (..., p, p).
+    """Covariance that the noise of a problem's logs gives an estimate X = G' Y, shape (..., p, p).
 
-    Parameters
-    ----------
-    problem : Problem
-        Logs and rows.
-    influence : sequence of Array, shape (..., r, p)
-        G of each of its parts.
+    G of each of its parts has shape (..., r, p).
     """
     each = zip(problem.parts, influence, strict=True)
     return sum((part.covariance.of_sums(G) for part, G in each), start=np.zeros(())) / problem.share
@@ -200,7 +195,7 @@ def pieces(chain: Chain, logs: Sequence[MotionLog]) -> list[Piece]:
     """Return every piece of logs, each with the chain whose mask is suited to the whole log."""
     suited = [_suited(chain, log) for log in logs]
     each = zip(suited, logs, strict=True)
-    return [(own, log, piece) for own, log in each for piece in own.pieces(log, piece_of(log))]
+    return [(own, log, piece) for own, log in each for piece in own.pieces(log)]
 
 
 def bias_counts(parts: Sequence[LogRows], names: tuple[str, ...], share: float) -> bool:
@@ -219,6 +214,5 @@ def bias_counts(parts: Sequence[LogRows], names: tuple[str, ...], share: float) 
 
 def _suited(chain: Chain, log: MotionLog) -> Chain:
     """The chain with prefilter and mask that suit a whole log, without anything else that its signals keep."""
-    prefilter = chain.suited_prefilter(log)
-    q = prefilter.apply(np.ascontiguousarray(np.swapaxes(log.q, -1, -2)), log.fs)
-    return replace(chain, prefilter=prefilter, mask=chain.mask.suited(chain.differentiator.derivative(q, log.fs)))
+    signals = chain.signals(log)
+    return replace(chain, prefilter=signals.prefilter, mask=chain.mask.suited(signals.state.qd))

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Literal, Self, TypeVar
+from typing import Self, TypeVar
 from weakref import ref
 
 import numpy as np
@@ -27,11 +27,6 @@ from idbench.identify.signals.signals import Signals
 ROUNDING = 1e-9  # Share by which frequencies may differ that are the same: of a file they are the mean of its steps
 
 
-def same_form(one: MotionLog, other: MotionLog) -> bool:
-    """True if two logs have the same samples, joints and, but for rounding, frequency."""
-    return one.q.shape[-2:] == other.q.shape[-2:] and abs(one.fs / other.fs - 1) < ROUNDING
-
-
 def require_logs(logs: Sequence[object]) -> None:
     """Raise LogError unless all are logs, of which there is one at least."""
     if not logs:
@@ -41,7 +36,6 @@ def require_logs(logs: Sequence[object]) -> None:
             raise LogError(f"{log!r:.60} is given where a MotionLog is needed, such as read_log(path)")
 
 
-Weights = Literal["measured", "own"]
 Reduced = TypeVar("Reduced")
 
 SAMPLED = 8  # Pieces of long logs from which noise is estimated and propagated
@@ -242,37 +236,29 @@ class Problem:
         begin = np.broadcast_to(np.array(BEGIN), (*joined[0].shape[:-2], len(BEGIN)))
         return likely(units, joined, begin, np.full(len(BEGIN), LEAST))
 
-    def at(self, log: MotionLog | Sequence[MotionLog], weights: Weights = "measured") -> Rows:
+    def at(self, log: MotionLog | Sequence[MotionLog]) -> Rows:
         """Return the rows of other logs, by the same chain, basis and model (instrumental variables, DIDIM).
 
-        Parameters
-        ----------
-        log : MotionLog or sequence of MotionLog
-            One for each log of this problem, of the same length.
-        weights : {"measured", "own"}
-            Whether instants are weighted as in the measured logs, or by the mask of the other log. A simulated motion reverses
-            at slightly other instants: with a mask of its own, its rows would be of other stretches (with DIDIM, errors of 1.2
-            instead of 0.024 %).
+        Instants are weighted as in the measured logs. A simulated motion reverses at slightly other instants: with a mask of
+        its own, its rows would be of other stretches (with DIDIM, errors of 1.2 instead of 0.024 %).
 
         Raises
         ------
         LogError
             If the logs are not as many, as long, or of the same frequency and joints.
         IdentificationError
-            If the logs are too long for their rows to be kept, or `weights` is unknown.
+            If the logs are too long for their rows to be kept.
         """
         self.require_rows("rows at another log need those of this one, and ")
         logs = [log] if isinstance(log, MotionLog) else list(log)
         require_logs(logs)
-        if len(logs) != len(self.logs) or not all(map(same_form, logs, self.logs)):
+        pairs = zip(logs, self.logs, strict=False)
+        alike = (a.q.shape[-2:] == b.q.shape[-2:] and abs(a.fs / b.fs - 1) < ROUNDING for a, b in pairs)
+        if len(logs) != len(self.logs) or not all(alike):
             raise LogError(
                 "rows at other logs need one log for each of the problem's, of the same length, frequency and joints"
             )
-        if weights not in ("measured", "own"):
-            raise IdentificationError(f"weights = {weights!r} is none of 'measured', 'own'")
-        signals = [self.chain.signals(one, given) for one, given in zip(logs, self.signals, strict=True)]
-        if weights == "own":
-            signals = [replace(one, weights_of=None) for one in signals]
+        signals = (self.chain.signals(one, given) for one, given in zip(logs, self.signals, strict=True))
         return Rows.stack([self.rows_of(one) for one in signals])
 
     def with_model(self, model: AbstractModel) -> "Problem":

@@ -57,8 +57,9 @@ def _settled(rows: "AdaptiveRows", here: Basis) -> Basis:
         here, there, cost = now
         X = _estimate(there, here)
         ahead, cost = _step(rows, here, X, cost)
-        moved = rows.factors(ahead)
-        return (ahead, moved, cost), not (np.abs(moved.fit(2).X - X) / _sigma(there) > SETTLED).any()
+        moved, factor = rows.factors(ahead), there.fit(2).factor
+        sigma = np.sqrt(np.diagonal(factor.inverse(factor.status == Status.OK), axis1=-2, axis2=-1))
+        return (ahead, moved, cost), not (np.abs(moved.fit(2).X - X) / sigma > SETTLED).any()
 
     return iterate(step, (here, rows.factors(here), rows.misfit(here)), ROUNDS)[0][0]
 
@@ -99,12 +100,6 @@ def _between(basis: Basis, X: Array, share: Array) -> Array:
     for place, old in basis.operating_point.items():
         found[..., place] = old + share * (X[..., place] - old)
     return found
-
-
-def _sigma(factors: Factors) -> Array:
-    """Return sigma of every parameter as the residuals of its rows have it, shape (..., p)."""
-    factor = factors.fit(2).factor
-    return np.sqrt(np.diagonal(factor.inverse(factor.status == Status.OK), axis1=-2, axis2=-1))
 
 
 @dataclass(frozen=True, eq=False)

@@ -87,18 +87,7 @@ def slopes(
 ) -> Slopes:
     """Return M(q) from the momenta at unit velocities, and central differences of the torques, joint by joint.
 
-    Parameters
-    ----------
-    basis : Basis
-        The robot.
-    X : Array, shape (..., p)
-        Its parameters.
-    q, qd, qdd : Array, shape (..., joint, time)
-        The motion.
-    slow : Array, shape (..., joint, time)
-        Velocities at which damping is taken.
-    conditions : mapping of str to Array, shape (..., joint or 1, time)
-        What else the log says.
+    X has shape (..., p), the motion (..., joint, time); damping is taken at the velocities `slow`, of that shape, too.
     """
     n = basis.n
     slides = np.where(np.abs(slow) < SLIDING, np.copysign(SLIDING, slow), slow)

@@ -65,21 +65,19 @@ class Paths:
     outside: Array
     """Weights of the rows, shape (..., kind, instant)."""
 
-    def covariance(self, level: Array) -> BandedCovariance:
-        """Return the covariance that noise of these standard deviations, shape (..., joint), gives the rows."""
-        return BandedCovariance.of(self.grid, self.windows, self._leveled(level), self.outside)
+    def covariance(self, level: Array, most: int | None = None) -> BandedCovariance:
+        """Covariance, over `most` lags, that noise of these standard deviations, shape (..., joint), gives the rows."""
+        leveled = [signal * level[..., None, :, None] for signal in self.signals]
+        return BandedCovariance.of(self.grid, self.windows, leveled, self.outside, most)
 
     def variance(self, level: Array) -> Array:
         """Return the variances that noise of these standard deviations, shape (..., joint), gives the rows, shape (..., r)."""
-        return BandedCovariance.of(self.grid, self.windows, self._leveled(level), self.outside, 1).variance
+        return self.covariance(level, 1).variance
 
     def each(self) -> Iterator[BandedCovariance]:
         """Yield the covariances that unit noise gives the rows, joint by joint."""
         for j in range(self.signals[0].shape[-2]):
             yield BandedCovariance.of(self.grid, self.windows, [x[..., j : j + 1, :] for x in self.signals], self.outside)
-
-    def _leveled(self, level: Array) -> list[Array]:
-        return [signal * level[..., None, :, None] for signal in self.signals]
 
 
 def torque_paths(rows: RowMap) -> Paths:
@@ -89,7 +87,8 @@ def torque_paths(rows: RowMap) -> Paths:
     over the little that they look at.
     """
     signals = rows.signals
-    windows, grid, places, _ = _thinned([signals.torque_adjoint(np.pad(rows.response, signals.reach))], rows)
+    reach = ceil((signals.prefilter.halo(signals.fs) + signals.torque.halo()) * signals.fs - 1e-9)
+    windows, grid, places, _ = _thinned([signals.torque_adjoint(np.pad(rows.response, reach))], rows)
     inside = between_samples(rows.inside, places)
     torques = np.zeros((*inside.shape[:-1], signals.log.n, inside.shape[-1]))
     for (row, joint), B in rows.B.items():
@@ -214,19 +213,16 @@ class NoisyRows:
         """Which rows are not void, shape (..., r)."""
         return in_order(self.to_rows.outside) > 0
 
-    def covariance(self, levels: NoiseLevels) -> BandedCovariance:
-        """Return the covariance that noise of these levels gives the rows."""
-        found = self.torque.covariance(levels.in_rows)
+    def covariance(self, levels: NoiseLevels, most: int | None = None) -> BandedCovariance:
+        """Covariance, over `most` lags, that noise of these levels gives the rows."""
+        found = self.torque.covariance(levels.in_rows, most)
         if levels.position.any():
-            found = found + self.position.covariance(levels.effective_position)
+            found = found + self.position.covariance(levels.effective_position, most)
         return found
 
     def variance(self, levels: NoiseLevels) -> Array:
         """Return the variance that noise of these levels gives the rows, shape (..., r)."""
-        found = self.torque.variance(levels.in_rows)
-        if levels.position.any():
-            found = found + self.position.variance(levels.effective_position)
-        return found
+        return self.covariance(levels, 1).variance
 
     @property
     def unmasked(self) -> "NoisyRows":

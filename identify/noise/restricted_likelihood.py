@@ -48,16 +48,8 @@ def likely_levels(
     the two; then come Newton's, by average information (A. R. Gilmour, R. Thompson and B. R. Cullis, "Average information
     REML: an efficient algorithm for variance parameter estimation in linear mixed models", Biometrics 51 (1995) 1440-1450).
 
-    Parameters
-    ----------
-    parts : sequence of Rows
-        Rows of the explicit model, log by log.
-    noisy : sequence of NoisyRows
-        How noise reaches them.
-    start : NoiseLevels
-        Where the torques begin, NaN in runs that cannot be solved; the positions.
-    resolution : Array, shape (..., joint), optional
-        Standard deviation of the rounding of the torques, below which their noise cannot be [N m].
+    The torques begin at `start`, NaN in runs that cannot be solved; `resolution` is the standard deviation of their rounding,
+    shape (..., joint), below which their noise cannot be [N m].
     """
     units = [each.units for each in noisy]
     joined = [rows.joined * each.kept[..., None] for rows, each in zip(parts, noisy, strict=True)]
@@ -75,16 +67,8 @@ def likely(
 ) -> Array:
     """Return the numbers, not below `least`, shape (..., i), with which C = sum of number_i C_i makes rows most likely.
 
-    Parameters
-    ----------
-    units : sequence of sequence of Band
-        C_i, log by log.
-    joined : sequence of Array, shape (..., r, p + 1)
-        [W Y], log by log.
-    start, least : Array, shape (..., i)
-        Where to begin, and where to end.
-    held : Array, shape (..., k), optional
-        Numbers of the C_i after those, which stay.
+    C_i are `units`, [W Y], of shape (..., r, p + 1), is `joined`, both log by log. The numbers of the C_i after those are
+    `held`, shape (..., k), optional.
     """
     held = np.zeros((*start.shape[:-1], 0)) if held is None else held
     number = count()

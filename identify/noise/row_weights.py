@@ -21,12 +21,7 @@ def two_levels(x: Array, z: Array, squares: Array) -> tuple[Array, Array]:
     """Return a and b, not negative, with which squares of expectation a x + b z are most likely, shape (...).
 
     (a, b)(k+1) = argmin sum ((y - a x - b z) / (a(k) x + b(k) z))^2: least squares with errors in proportion to the
-    expectation, iterated (Whittle's likelihood, of a spectrum).
-
-    Parameters
-    ----------
-    x, z, squares : Array, shape (..., r)
-        The two parts of the expectation, not negative, and what was found.
+    expectation, iterated (Whittle's likelihood, of a spectrum). x and z, not negative, and squares have shape (..., r).
     """
     x, z, squares = np.broadcast_arrays(x, z, squares)
     means = [np.mean(part, axis=-1, keepdims=True) for part in (x, z, squares)]
@@ -54,18 +49,11 @@ SURE = 4.0  # Speed over the noise of the velocity at which a joint is certain t
 
 
 def unbiased(rows: Rows, noisier: Rows) -> Rows:
-    """Return the rows of one log with W less what noise of the positions adds to it on average.
+    """Return the rows of one log with W less what noise of the positions adds to it, by those of `with_more_noise`.
 
     Columns hold squares of velocities and sines of positions, so that noise does not average out of them. More noise n of the
     same size, put in with either sign, shows how much: W(q + n) + W(q - n) - 2 W(q) holds the squares alone, and its half is,
     on average, what the log's own noise has added. (One noise is enough: only its squares are left to chance.)
-
-    Parameters
-    ----------
-    rows : Rows
-        Of one log.
-    noisier : Rows
-        Those of `with_more_noise`.
     """
     return replace(rows, W=2 * rows.W - np.mean(noisier.W, axis=0))
 
@@ -74,14 +62,8 @@ def with_more_noise(signals: Signals, level: Array) -> Signals:
     """Return the signals of two logs, with more noise in the positions, put in with either sign, and with the same mask.
 
     Every run meets the same noise; which joint gets which part of it depends on how far it moves, not on the order of joints.
-    Joints that hardly move get none: their encoder's error is constant, and |qd|, of Coulomb friction, has no square.
-
-    Parameters
-    ----------
-    signals : Signals
-        Of one log.
-    level : Array, shape (..., joint)
-        Standard deviation of the positions' noise [rad].
+    Joints that hardly move get none: their encoder's error is constant, and |qd|, of Coulomb friction, has no square. `level`
+    is the standard deviation of the positions' noise [rad], shape (..., joint).
     """
     log, rng = signals.log, np.random.default_rng(0)
     moves = np.abs(smoothed(signals.state.qd, log.fs)) > SURE * signals.gain * level[..., None]
@@ -99,18 +81,8 @@ MIN_RATIO, MAX_RATIO = 0.01, 10.0
 def friction_bias(to_rows: RowMap, linear: Linearization, model: AbstractModel, position: Array) -> Array:
     """Bias of W X by noise of the velocities where joints hardly move, shape (..., r).
 
-    Friction turns noise into power, Fs |qd|, of one sign: that of a velocity of E|qd + noise| - |qd|.
-
-    Parameters
-    ----------
-    to_rows : RowMap
-        Of one log.
-    linear : Linearization
-        Of the explicit model, about its signals: basis and X.
-    model : AbstractModel
-        Whose rows they are.
-    position : Array, shape (..., joint)
-        Standard deviation of the positions' noise [rad].
+    Friction turns noise into power, Fs |qd|, of one sign: that of a velocity of E|qd + noise| - |qd|. `position` is the
+    standard deviation of the positions' noise [rad], shape (..., joint).
     """
     signals = to_rows.signals
     speed = rectified(smoothed(signals.state.qd, signals.fs), position[..., None] * signals.gain)
@@ -123,16 +95,8 @@ def floor_of(squares: Array, variance: Array, valid: npt.NDArray[np.bool_]) -> A
 
     v is what the noise of torques and positions makes of a row. What is not noise, such as cogging, or friction of another kind
     near standstill, does not vanish where v does: with weights of v alone the slow rows of the power model, in which it is most
-    of the torque, would count most. a and b, not negative, are fitted with errors in proportion to the variances themselves.
-
-    Parameters
-    ----------
-    squares : Array, shape (..., r)
-        Squared residuals.
-    variance : Array, shape (..., r)
-        v.
-    valid : bool array, shape (..., r)
-        False for void rows, which say nothing.
+    of the torque, would count most. a and b, not negative, are fitted with errors in proportion to the variances themselves, to
+    squares and variances of shape (..., r), of rows that are valid.
     """
     count = np.maximum(np.sum(valid, axis=-1, keepdims=True), 1)
     mean = np.sum(variance * valid, axis=-1, keepdims=True) / count

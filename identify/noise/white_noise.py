@@ -76,14 +76,8 @@ def torque_noise(logs: Sequence[Signals], residual: Array) -> Array:
     """Return the standard deviation of white noise in the torques [N m], shape (..., joint).
 
     From differences of the torques, as of the positions, and not more than what residuals allow: a torque that is switched, or
-    that a controller makes of a rough position, has large differences without any noise.
-
-    Parameters
-    ----------
-    logs : sequence of Signals
-        Torques of each log.
-    residual : Array, shape (..., joint)
-        The noise of the torques that would explain residuals [N m].
+    that a controller makes of a rough position, has large differences without any noise. `residual` is the noise of the torques
+    that would explain residuals [N m], shape (..., joint).
     """
     if any(each.log.poses for each in logs):
         return residual

@@ -22,6 +22,8 @@ from idbench.identify.signals.prefilters import AbstractPrefilter, ButterworthPr
 from idbench.identify.signals.signals import Signals
 from idbench.identify.signals.torques import AbstractAlignment, AsLogged, ByChannel
 
+PIECE = 6e5  # Samples times joints squared of a piece: columns grow with the joints squared, and take some 100 MB
+
 
 @dataclass(frozen=True)
 class Chain:
@@ -89,13 +91,13 @@ class Chain:
     def _grid_of(self, signals: Signals) -> Grid:
         return replace(self, prefilter=signals.prefilter).grid(signals.log)
 
-    def pieces(self, log: MotionLog, samples: int) -> list[tuple[int, int]]:
+    def pieces(self, log: MotionLog) -> list[tuple[int, int]]:
         """Return first sample and end of pieces of a log, each with the samples that its rows look at.
 
-        The rows of all pieces are those of the log, to what a recursive filter forgets; each piece has those of some `samples`.
+        The rows of all pieces are those of the log, to what a recursive filter forgets; each piece has those of `PIECE`.
         """
         grid, reach = self.grid(log), ceil(self.margin(log) * log.fs - 1e-9)
-        rows = max(1, samples // grid.step)
+        rows = max(1, int(PIECE / log.n**2) // grid.step)
         starts = [(grid.first + row * grid.step - reach, min(rows, grid.count - row)) for row in range(0, grid.count, rows)]
         return [(start, start + 2 * reach + count * grid.step) for start, count in starts]
 

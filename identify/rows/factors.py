@@ -250,12 +250,7 @@ class Factors:
     def fit(self, rounds: int = 0) -> LeastSquaresFit:
         """Return the least-squares solution, with rows divided by the rms of their kind's residuals after the first step.
 
-        X(k+1) = argmin sum over kinds |Y - W X|^2 / rms(Y - W X(k))^2.
-
-        Parameters
-        ----------
-        rounds : int
-            How often weights are taken from the residuals of the solution before.
+        X(k+1) = argmin sum over kinds |Y - W X|^2 / rms(Y - W X(k))^2 for k < `rounds`.
         """
         if not self._fits:
             one = np.ones(self.rows.shape)

@@ -15,7 +15,6 @@ from idbench.identify.models import Equations
 from idbench.identify.rows.factors import Factors, triangular
 from idbench.identify.rows.row_map import RowMap, in_order
 
-PIECE = 6e5  # Samples times joints squared of a piece: columns grow with the joints squared, and take some 100 MB
 BYTES = 1.6e7  # Of columns that are made at once: they stay in a cache, and little of a log is looked at twice
 LONG = 1e7  # Samples times joints squared, of all logs of a fit, beyond which rows are not kept
 
@@ -29,11 +28,6 @@ def manageable(logs: Sequence[MotionLog]) -> list[MotionLog]:
     """Return logs, or the beginning of each where their rows would be too many to be kept."""
     share = LONG / _size(logs)
     return [log.part(0, int(share * log.samples)) for log in logs] if is_long(logs) else list(logs)
-
-
-def piece_of(log: MotionLog) -> int:
-    """Return the samples of a piece of a log."""
-    return int(PIECE / log.n**2)
 
 
 def _size(logs: Sequence[MotionLog]) -> int:
@@ -126,11 +120,6 @@ class Rows:
     def predicted(self, X: Array) -> Array:
         """Return W X, shape (..., r)."""
         return np.matmul(self.W, X[..., None])[..., 0]
-
-    def of_log(self, k: int) -> slice:
-        """Rows of log `k`, as a slice."""
-        ends = np.cumsum([0, *(part.rows for part in self.maps)])
-        return slice(int(ends[k]), int(ends[k + 1]))
 
     @classmethod
     def stack(cls, parts: Sequence[Self]) -> Self:

@@ -66,14 +66,9 @@ def averaged(x: Array, variance: float) -> Array:
 
 
 def between_samples(x: Array, places: Array) -> Array:
-    """Return `x` at places [samples], linearly between two of its samples: x(k + s) = x(k) + s (x(k + 1) - x(k)).
+    """Return `x`, shape (..., time), at places [samples], shape (m,), from 0 to its last sample: linear between two.
 
-    Parameters
-    ----------
-    x : Array, shape (..., time)
-        The signal.
-    places : Array, shape (m,)
-        From 0 to the last sample.
+    x(k + s) = x(k) + s (x(k + 1) - x(k)).
     """
     first = places.astype(np.intp)
     s = places - first

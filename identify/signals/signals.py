@@ -153,11 +153,6 @@ class Signals:
         impulse[len(impulse) // 2] = 1.0
         return float(np.linalg.norm(self.s(self.prefilter.apply(impulse, self.fs))))
 
-    @property
-    def reach(self) -> int:
-        """Samples to either side that prefilter and alignment of the torque look at."""
-        return ceil((self.prefilter.halo(self.fs) + self.torque.halo()) * self.fs - 1e-9)
-
     def torque_adjoint(self, z: Array) -> Array:
         """Return the adjoint of prefilter and alignment at `z`, shape (..., time).
 

@@ -6,22 +6,13 @@ from idbench.identify.arrays import Array
 
 
 def welch(x: Array, fs: float, length: int) -> tuple[Array, Array]:
-    """Return frequencies [Hz] and the one-sided power density of signals (..., time), as `scipy.signal.welch`.
+    """Return frequencies [Hz] and the one-sided power density of signals (..., time) at fs [Hz], as `scipy.signal.welch`.
 
-    Of pieces that overlap by half, without their means, through a Hann window w,
+    Of pieces of some length that overlap by half, without their means, through a Hann window w,
 
         S = 2 mean |FFT(w (x - mean))|^2 / (fs sum w^2),   at 0 and at the Nyquist frequency once.
 
     P. Welch, IEEE Trans. Audio and Electroacoustics 15 (1967) 70-73.
-
-    Parameters
-    ----------
-    x : Array, shape (..., time)
-        Signals.
-    fs : float
-        Sampling frequency [Hz].
-    length : int
-        Of a piece.
     """
     window = 0.5 - 0.5 * np.cos(2 * np.pi * np.arange(length) / length) if length > 1 else np.ones(1)
     pieces = np.lib.stride_tricks.sliding_window_view(x, length, axis=-1)[..., :: length - length // 2, :]

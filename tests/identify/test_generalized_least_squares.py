@@ -24,7 +24,7 @@ from idbench.identify.noise.band_matrix import BandMatrix, Cholesky
 from idbench.identify.noise.propagation import NoiseLevels, NoisyRows
 from idbench.identify.noise.restricted_likelihood import _Slope, likely_levels
 from idbench.identify.noise.row_weights import unbiased, with_more_noise
-from idbench.identify.rows import rows
+from idbench.identify.rows import chain, rows
 
 EVERY = {name: MODELS.create(name) for name in MODELS.builtin}
 GLS = GeneralizedLeastSquares()
@@ -140,7 +140,7 @@ def test_two_logs_are_worth_two_and_long_ones_come_in_pieces(log, monkeypatch):
     double = identify([single, single], scara(), EVERY["explicit"], estimator=GLS)
     np.testing.assert_allclose(np.sqrt(2) * double.own_sigma, sigma, rtol=0.1)
     monkeypatch.setattr(rows, "LONG", 1e4)
-    monkeypatch.setattr(rows, "PIECE", 4e3)
+    monkeypatch.setattr(chain, "PIECE", 4e3)
     pieces = identify(single, scara(), EVERY["explicit"], estimator=GLS)
     assert pieces.problem.long
     np.testing.assert_allclose(pieces.own_sigma, sigma, rtol=0.25)

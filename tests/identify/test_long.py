@@ -6,6 +6,7 @@ import builders
 import numpy as np
 import pytest
 
+import idbench.identify.rows.chain
 import idbench.identify.rows.rows
 from idbench.identify import (
     CHAINS,
@@ -22,14 +23,14 @@ from idbench.identify import (
     validate,
 )
 from idbench.identify.judge.delay import estimate_delay
-from idbench.identify.rows.rows import is_long, manageable, piece_of
+from idbench.identify.rows.rows import is_long, manageable
 
 
 @pytest.fixture
 def short(monkeypatch):
     """Logs of more than 1000 samples of two joints count as long, pieces have 500 samples, until what is returned is called."""
     monkeypatch.setattr(idbench.identify.rows.rows, "LONG", 4000)
-    monkeypatch.setattr(idbench.identify.rows.rows, "PIECE", 2000)
+    monkeypatch.setattr(idbench.identify.rows.chain, "PIECE", 2000)
     return lambda: monkeypatch.setattr(idbench.identify.rows.rows, "LONG", 1e9)
 
 
@@ -65,7 +66,7 @@ def test_pieces_have_the_rows_of_the_log(chain, noisy, short):
     """All of chain idbench, whose memory ends; those of an IIR filter to what it forgets: 1 %."""
     made, model = CHAINS.create(chain), MODELS.create("implicit")
     made = made if made.mask == NoMask() else replace(made, mask=ReversalMask(0.1))  # whose speeds do not follow a piece
-    cut = [noisy.part(*piece) for piece in made.pieces(noisy, piece_of(noisy))]
+    cut = [noisy.part(*piece) for piece in made.pieces(noisy)]
     short()
     by_piece = Rows.stack([Problem((piece,), scara(), model, made).rows for piece in cut])
     whole = Problem((noisy,), scara(), model, made).rows

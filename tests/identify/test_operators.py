@@ -172,7 +172,7 @@ def test_fir_computes_what_a_full_convolution_gives(rng):
 
 @pytest.mark.parametrize("intervals", range(2, 13))
 def test_windows_of_any_length_integrate_cubics_exactly(intervals):
-    weights = Windows(intervals / FS).kernels(FS).integral
+    weights = Windows(intervals / FS).response(FS)
     t = np.arange(intervals + 1) / FS
     for power in range(4):
         assert weights @ t**power == pytest.approx(t[-1] ** (power + 1) / (power + 1), rel=1e-12)

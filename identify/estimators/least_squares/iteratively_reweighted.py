@@ -11,7 +11,7 @@ from idbench.identify.arrays import TINY, Array, frozen
 from idbench.identify.data.motion_log import MotionLog
 from idbench.identify.errors import require_positive, require_whole
 from idbench.identify.estimators.estimate import Estimate
-from idbench.identify.estimators.estimator import AbstractEstimator, Need
+from idbench.identify.estimators.estimator import AbstractEstimator
 from idbench.identify.estimators.problem import Problem
 from idbench.identify.estimators.simulating.row_products import Kinds, Solved, solve_with, with_weights
 from idbench.identify.estimators.solution import Given
@@ -40,7 +40,6 @@ class IterativelyReweighted(AbstractEstimator):
     """
 
     acronym: ClassVar[str] = "IRLS"
-    needs: ClassVar[frozenset[Need]] = frozenset({"rows"})
 
     tuning: float = 4.685
     """Standard deviations from which on a row has no part; 4.685 loses 5 % where errors are normal."""
@@ -58,7 +57,8 @@ class IterativelyReweighted(AbstractEstimator):
         Y, W = rows.Y * kinds.own, rows.W * kinds.own[..., None]
         begin = solve_with(kinds, rows.Y, rows.W, rows.W)
         begin = replace(begin, residual=begin.residual * kinds.own)
-        weights = _Weights.start(kinds, begin.residual, self.tuning, _relative(clean, kinds), _least(Y, kinds))
+        least = np.maximum(EXACT * np.sqrt(np.mean(kinds.by_kind(Y) ** 2, axis=-2)), TINY)
+        weights = _Weights.start(kinds, begin.residual, self.tuning, _relative(clean, kinds), least)
 
         def step(before: Solved) -> tuple[Solved, npt.NDArray[np.bool_]]:
             nonlocal weights
@@ -153,11 +153,6 @@ def _relative(problem: Problem, kinds: Kinds) -> Array:
     size = kinds.by_kind(np.sqrt(np.nan_to_num(variance)) * kinds.own)
     typical = _spread(size, kinds.by_kind(kinds.own) > 0)[..., None, :] / SIGMA
     return np.maximum(np.where(typical > 0, size / typical, 1.0), MIN_DEVIATION)
-
-
-def _least(Y: Array, kinds: Kinds) -> Array:
-    """Least noise, shape (..., kind): a share of the measurements' rms."""
-    return np.maximum(EXACT * np.sqrt(np.mean(kinds.by_kind(Y) ** 2, axis=-2)), TINY)
 
 
 def _tukey(x: Array, tuning: float) -> Array:

@@ -8,9 +8,9 @@ import numpy as np
 from idbench.identify.arrays import Array, frozen
 from idbench.identify.errors import IdentificationError, require_positive
 from idbench.identify.estimators.estimate import Estimate
-from idbench.identify.estimators.estimator import AbstractEstimator, Need
+from idbench.identify.estimators.estimator import AbstractEstimator
 from idbench.identify.estimators.problem import Problem
-from idbench.identify.estimators.simulating.row_products import Kinds, solve_with, with_weights
+from idbench.identify.estimators.simulating.row_products import Kinds, covariance_by, solve_with, with_weights
 from idbench.identify.estimators.solution import Given
 from idbench.identify.rows.factors import Factor, Status
 
@@ -24,7 +24,6 @@ class RecursiveLeastSquares(AbstractEstimator):
     """
 
     acronym: ClassVar[str] = "RLS"
-    needs: ClassVar[frozenset[Need]] = frozenset({"rows"})
 
     memory: float = 10.0
     """Time [s] after which a row counts a third."""
@@ -43,7 +42,8 @@ class RecursiveLeastSquares(AbstractEstimator):
         even = kinds.weights(every.residual)
         weight = even * np.exp(-np.concatenate(ages) / (2 * self.memory))
         found = with_weights(rows.Y, rows.W, weight)
-        return Estimate(problem, frozen(found.X), frozen(found.covariance_by(even)), Given(found.G, weight))
+        covariance = covariance_by(even, found.G, found.residual)
+        return Estimate(problem, frozen(found.X), frozen(covariance), Given(found.G, weight))
 
 
 @dataclass(frozen=True, eq=False)

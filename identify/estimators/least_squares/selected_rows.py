@@ -9,7 +9,7 @@ import numpy.typing as npt
 from idbench.identify.arrays import Array, frozen
 from idbench.identify.errors import require_positive
 from idbench.identify.estimators.estimate import Estimate
-from idbench.identify.estimators.estimator import AbstractEstimator, Need
+from idbench.identify.estimators.estimator import AbstractEstimator
 from idbench.identify.estimators.problem import Problem
 from idbench.identify.estimators.simulating.row_products import with_weights
 from idbench.identify.estimators.solution import Given
@@ -29,7 +29,6 @@ class SelectedRows(AbstractEstimator):
     """
 
     acronym: ClassVar[str] = "OLS"
-    needs: ClassVar[frozenset[Need]] = frozenset({"rows"})
 
     apart: float | None = None
     """Minimum time between selected rows [s]; by default the length of a window."""
@@ -53,22 +52,14 @@ class SelectedRows(AbstractEstimator):
 def _length(problem: Problem) -> float:
     """Return the length of the windows [s]; 0 of rows that are no integrals, all of which are then selected."""
     operator, fs = problem.own_chain.operator, problem.logs[0].fs
-    return (len(operator.kernels(fs).integral) - 1) / fs if isinstance(operator, AbstractWeakForm) else 0.0
+    return (len(operator.response(fs)) - 1) / fs if isinstance(operator, AbstractWeakForm) else 0.0
 
 
 def selected(W: Array, valid: npt.NDArray[np.bool_], time: Array, log: Array, apart: float) -> npt.NDArray[np.bool_]:
     """Mask of the selected rows, shape (r,), by the greedy step k = argmax w_k' M^-1 w_k of `SelectedRows`.
 
-    Parameters
-    ----------
-    W : Array, shape (r, p)
-        Rows.
-    valid : array, shape (r,)
-        Rows that may be selected.
-    time, log : Array, shape (r,)
-        Instant [s], and number of the log, of every row.
-    apart : float
-        Minimum time between selected samples [s]; the rows of one sample are selected one by one.
+    Rows W, shape (r, p), may be selected where they are valid; `time` is their instant [s], and `log` the number of their log,
+    shape (r,). The rows of one sample are selected one by one.
     """
     gaps = np.diff(time)[(np.diff(log) == 0) & (np.diff(time) > 0)]
     if not len(gaps) or gaps.min() >= apart * (1 - 1e-9):

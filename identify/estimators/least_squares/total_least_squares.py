@@ -8,7 +8,7 @@ import numpy as np
 from idbench.identify.arrays import Array
 from idbench.identify.errors import IdentificationError, require_whole
 from idbench.identify.estimators.estimate import Estimate
-from idbench.identify.estimators.estimator import AbstractEstimator, Need
+from idbench.identify.estimators.estimator import AbstractEstimator
 from idbench.identify.estimators.problem import Problem
 from idbench.identify.estimators.simulating.row_products import Kinds, solve_with
 from idbench.identify.rows.factors import Status, triangular
@@ -33,7 +33,6 @@ class TotalLeastSquares(AbstractEstimator):
     """
 
     acronym: ClassVar[str] = "TLS"
-    needs: ClassVar[frozenset[Need]] = frozenset({"rows"})
 
     draws: int = 8
     """Noises of which S is the mean."""

@@ -72,13 +72,6 @@ class JointFit:
     left_out: str = ""
     """Why reversals, which were asked for, are left out; empty if they are used, or were not asked for."""
 
-    @classmethod
-    def start(
-        cls, logs: tuple[Cells, ...], basis: Basis, X: Array, levels: NoiseLevels, *, find_delay: bool = False
-    ) -> "JointFit":
-        """Initial fit: logged positions and their differences at the nodes."""
-        return cls(logs, basis, X, tuple(_begin(cells) for cells in logs), levels, 0.0 if find_delay else None)
-
     @property
     def unknowns(self) -> Array:
         """Parameters, and the delay if it is unknown."""
@@ -154,7 +147,9 @@ class JointFit:
         q, qd, _ = cells.motion(z, 0.5)
         slow = smoothed(qd, cells.log.fs)
         weight = MASK.weight(slow, cells.log.fs)
-        turns = self._turns(cells, z, slow, weight < 1)
+        turns = Turns.none((self.basis.n, cells.count))
+        if self.near is not None:
+            turns = Turns.of(cells, self.basis, self.X, z, stretches(slow, weight < 1), self.near)
         lost = np.where(turns.near, 0.0, (1 - weight) * UNKNOWN * friction_jumps(self.basis, self.X, q[:, 0])[:, None])
         mean = np.where(turns.near, self._near[:, None], self.levels.torque[:, None])
         half = np.hypot(np.where(turns.near, TURNING, HELD) * mean, cells.rough)
@@ -166,12 +161,6 @@ class JointFit:
     def _near(self) -> Array:
         """Levels of the torques near reversals, shape (joint,)."""
         return self.levels.torque if self.near is None else self.near
-
-    def _turns(self, cells: Cells, z: Array, qd: Array, slow: npt.NDArray[np.bool_]) -> Turns:
-        """Turns that leave out friction in slow cells, a mask of shape (joint, cell), or use it."""
-        if self.near is None:
-            return Turns.none((self.basis.n, cells.count))
-        return Turns.of(cells, self.basis, self.X, z, stretches(qd, slow), self.near)
 
     def _velocities(self, cells: Cells, known: npt.NDArray[np.bool_]) -> tuple[Array, Array]:
         """Tolerance of node velocities about differences of the positions, and these, shape (node, joint) each.
@@ -222,7 +211,7 @@ class _Moved(NamedTuple):
     taken: Array
 
 
-def _begin(cells: Cells) -> Array:
+def logged_motion(cells: Cells) -> Array:
     """Return positions and velocities at the nodes of a log, by parabolas through its positions."""
     q, rate = cells.log.q.T, _differences(cells)
     qd = _at_nodes(cells, smoothed(rate, cells.log.fs))

@@ -13,7 +13,7 @@ from idbench.identify.estimators.estimate import Estimate
 from idbench.identify.estimators.estimator import AbstractEstimator, Need
 from idbench.identify.estimators.least_squares.ordinary_weighted_generalized import GeneralizedLeastSquares
 from idbench.identify.estimators.likelihood.cells import Cells, hermite
-from idbench.identify.estimators.likelihood.joint_fit import CHECK, JointFit
+from idbench.identify.estimators.likelihood.joint_fit import CHECK, JointFit, logged_motion
 from idbench.identify.estimators.likelihood.normal_equations import NormalEquations
 from idbench.identify.estimators.problem import Problem
 from idbench.identify.models import ExplicitModel
@@ -189,7 +189,8 @@ class MaximumLikelihood(AbstractEstimator):
         # A joint at rest does not determine its torque.
         torque = np.where(np.isfinite(levels.torque), np.maximum(levels.torque, BEGIN * rms), rms)
         own = NoiseLevels(torque, levels.position, levels.repeats)
-        begin = JointFit.start(logs, problem.basis, start.X[run], own, find_delay=self.find_delay)
+        delay, motions = (0.0 if self.find_delay else None), tuple(map(logged_motion, logs))
+        begin = JointFit(logs, problem.basis, start.X[run], motions, own, delay)
         found = _through_reversals(begin, EXACT * rms) if self.reversals else begin.solved(EXACT * rms)
         X, sigma = start.X[run], start.own_sigma[run]
         if found.delay is not None:

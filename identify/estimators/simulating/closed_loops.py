@@ -9,7 +9,6 @@ import numpy as np
 from idbench.identify.arrays import TINY, Array
 from idbench.identify.data.motion_log import MotionLog
 from idbench.identify.estimators.estimate import Estimate
-from idbench.identify.estimators.estimator import Need
 from idbench.identify.estimators.problem import Problem
 from idbench.identify.estimators.simulating.row_products import Kinds, Solved, scatter, solve_with
 from idbench.identify.estimators.simulating.simulated_rounds import (
@@ -35,7 +34,6 @@ class DirectInverse(AbstractSimulating):
 
     settled: float = 0.1
     acronym: ClassVar[str] = "DIDIM"
-    needs: ClassVar[frozenset[Need]] = frozenset({"rows", "loop"})
 
     def solve(self, problem: Problem) -> Estimate:
         """Return the estimate of every run."""
@@ -64,7 +62,6 @@ class InstrumentalVariables(AbstractSimulating):
 
     settled: float = 0.1
     acronym: ClassVar[str] = "IV"
-    needs: ClassVar[frozenset[Need]] = frozenset({"rows", "loop"})
 
     def solve(self, problem: Problem) -> Estimate:
         """Return the estimate of every run."""
@@ -90,17 +87,6 @@ def gauss_newton(problem: Problem, rounds: Rounds, output: Output, kinds: Kinds)
 
     Each round simulates all p + 1 robots at once. A step that makes the residuals grow is halved. The first is one of least
     squares of the torques on the simulated rows, for which a start may be far off.
-
-    Parameters
-    ----------
-    problem : Problem
-        What is solved.
-    rounds : Rounds
-        How long.
-    output : callable
-        What is compared.
-    kinds : Kinds
-        Which residuals have the same variance.
     """
     measured, h = output(problem.logs), small_steps(problem)
     X = rounds.start()
@@ -138,7 +124,6 @@ class ClosedLoopInputError(AbstractSimulating):
     """
 
     acronym: ClassVar[str] = "CLIE"
-    needs: ClassVar[frozenset[Need]] = frozenset({"rows", "loop"})
 
     def solve(self, problem: Problem) -> Estimate:
         """Return the estimate of every run; raise IdentificationError if the model is not the explicit one."""
@@ -164,7 +149,6 @@ class ClosedLoopOutputError(AbstractSimulating):
     """
 
     acronym: ClassVar[str] = "CLOE"
-    needs: ClassVar[frozenset[Need]] = frozenset({"rows", "loop"})
     filtered: ClassVar[bool] = False
 
     def solve(self, problem: Problem) -> Estimate:

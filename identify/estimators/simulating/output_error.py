@@ -4,10 +4,8 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-import numpy.typing as npt
 
 from idbench.identify.arrays import Array
-from idbench.identify.data.motion_log import MotionLog
 from idbench.identify.errors import IdentificationError, require_positive
 from idbench.identify.estimators.estimate import Estimate
 from idbench.identify.estimators.estimator import Need
@@ -56,7 +54,7 @@ class OutputError(AbstractSimulating):
             each = ", ".join(f"{log.fs:g}" for log in problem.logs)
             raise IdentificationError(f"OE takes logs of one frequency, these have {each} Hz: resample them, or use DIDIM")
         rounds, h = self.begun(problem), small_steps(problem)
-        shots = {run: [_Shots.of(problem, plant, k, run, self.length) for k in range(len(problem.logs))]
+        shots = {run: [_Shots(problem, plant, k, run, self.length) for k in range(len(problem.logs))]
                  for run in np.ndindex(rounds.simulations.shape)}  # fmt: skip
 
         def step(X: Array) -> Solved:
@@ -100,20 +98,9 @@ class OutputError(AbstractSimulating):
 
 
 class _Shots:
-    """The segments of one log, and the states at which they begin."""
+    """The segments of a log of one run, and the states at which they begin; at its ends, without velocities, there are none."""
 
-    def __init__(self, plant: AbstractPlant, log: MotionLog, first: npt.NDArray[np.intp], count: int, states: Array) -> None:
-        self._plant = plant
-        self._log = log
-        self._first = first
-        self._count = count
-        self._states = states
-        self._measured = np.stack([log.q[k : k + count] for k in first.tolist()])
-        self._of_X, self._rest = np.empty(0), np.empty(0)
-
-    @classmethod
-    def of(cls, problem: Problem, plant: AbstractPlant, k: int, run: tuple[int, ...], length: float) -> "_Shots":
-        """Return the segments of a log of one run; where velocities are none, at its ends, there are no segments."""
+    def __init__(self, problem: Problem, plant: AbstractPlant, k: int, run: tuple[int, ...], length: float) -> None:
         whole, signals = problem.logs[k], problem.signals[k]
         log, count = whole.run(run), max(4, round(length * whole.fs))
         margin = int(np.ceil(problem.chain.margin(whole) * whole.fs))
@@ -123,7 +110,13 @@ class _Shots:
                 f"a log of {log.samples / log.fs:.3g} s has no two segments of {length:g} s: use a longer log"
             )
         qd = np.swapaxes(signals.state.qd[run], -1, -2)[first]
-        return cls(plant, log, first, count, np.concatenate([log.q[first], qd], axis=-1))
+        self._plant = plant
+        self._log = log
+        self._first = first
+        self._count = count
+        self._states = np.concatenate([log.q[first], qd], axis=-1)
+        self._measured = np.stack([log.q[k : k + count] for k in first.tolist()])
+        self._of_X, self._rest = np.empty(0), np.empty(0)
 
     def linearized(self, X: Array, h: Array) -> tuple[Array, Array]:
         """Return residuals, shape (segment, count, joint), and their slopes by X, both without what initial states explain."""

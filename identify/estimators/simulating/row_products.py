@@ -60,10 +60,6 @@ class Solved:
         """Standard deviations of X, shape (..., p)."""
         return np.sqrt(np.diagonal(self.covariance, axis1=-2, axis2=-1))
 
-    def covariance_by(self, weight: Array) -> Array:
-        """Return the covariance of X if residuals times these weights, shape (..., r), are independent and alike."""
-        return _covariance(self.G, self.residual, weight)
-
     def where(self, active: npt.NDArray[np.bool_], before: "Solved") -> "Solved":
         """Return this solution in the runs that are active, and that before in the others."""
         pairs = [(getattr(self, x), getattr(before, x)) for x in ("X", "G", "residual", "covariance")]
@@ -73,36 +69,26 @@ class Solved:
 def solve_with(kinds: Kinds, Y: Array, W: Array, Z: Array) -> Solved:
     """Return X = (Z' w^2 W)^-1 Z' w^2 Y, weights w from the residuals of the solution before, twice.
 
-    Parameters
-    ----------
-    kinds : Kinds
-        Which rows have residuals of the same variance.
-    Y : Array, shape (..., r)
-        Measurements.
-    W, Z : Array, shape (..., r, p)
-        Regressors and instruments; those of least squares are the regressors.
+    Y has shape (..., r), regressors W and instruments Z have (..., r, p); those of least squares are the regressors.
     """
-    found = _solved(Y, W, Z, kinds.own)
+    found = with_weights(Y, W, kinds.own, Z)
     for _ in range(ROUNDS):
-        found = _solved(Y, W, Z, kinds.weights(found.residual))
+        found = with_weights(Y, W, kinds.weights(found.residual), Z)
     return found
 
 
-def with_weights(Y: Array, W: Array, weight: Array) -> Solved:
-    """Return the least-squares solution of rows multiplied by weights, shape (..., r)."""
-    return _solved(Y, W, W, weight)
-
-
-def _solved(Y: Array, W: Array, Z: Array, weight: Array) -> Solved:
-    weighted = Z * (weight**2)[..., None]
+def with_weights(Y: Array, W: Array, weight: Array, Z: Array | None = None) -> Solved:
+    """Return X = (Z' w^2 W)^-1 Z' w^2 Y for weights w, shape (..., r); by default Z is W: least squares."""
+    weighted = (W if Z is None else Z) * (weight**2)[..., None]
     inverse = _inverse(np.matmul(np.swapaxes(weighted, -1, -2), W))
     G = np.matmul(weighted, np.swapaxes(inverse, -1, -2))
     X = np.sum(G * Y[..., None], axis=-2)
     residual = Y - np.matmul(W, X[..., None])[..., 0]
-    return Solved(X, G, residual, _covariance(G, residual, weight))
+    return Solved(X, G, residual, covariance_by(weight, G, residual))
 
 
-def _covariance(G: Array, residual: Array, weight: Array) -> Array:
+def covariance_by(weight: Array, G: Array, residual: Array) -> Array:
+    """Covariance of X = G' Y if residuals times weights, shape (..., r), are independent and alike, shape (..., p, p)."""
     freedom = np.maximum(np.sum(weight > 0, axis=-1) - G.shape[-1], 1)
     variance = np.sum((residual * weight) ** 2, axis=-1) / freedom
     white = G / np.where(weight > 0, weight, np.inf)[..., None]
@@ -135,16 +121,8 @@ def scatter(found: Solved, kinds: Kinds, logs: Sequence[tuple[slice, float]]) ->
 
     G' C G with C the covariance of residuals as their autocorrelation says, tapered to zero over `MEMORY` (W. K. Newey and
     K. D. West, "A simple, positive semi-definite, heteroskedasticity and autocorrelation consistent covariance matrix",
-    Econometrica 55 (1987) 703-708): for estimators whose residuals the noise of the log reaches through a closed loop.
-
-    Parameters
-    ----------
-    found : Solved
-        G and residuals.
-    kinds : Kinds
-        Which residuals have the same variance.
-    logs : sequence of (slice, float)
-        Which residuals are those of each log, and how many instants [1/s] they have.
+    Econometrica 55 (1987) 703-708): for estimators whose residuals the noise of the log reaches through a closed loop. `logs`
+    has the residuals of each log, and their instants per second [1/s].
     """
     own = kinds.own > 0
     total = np.zeros(found.covariance.shape)

@@ -11,10 +11,10 @@ from idbench.identify.arrays import Array, frozen
 from idbench.identify.data.motion_log import MotionLog
 from idbench.identify.errors import IdentificationError, require_positive, require_whole
 from idbench.identify.estimators.estimate import Estimate
-from idbench.identify.estimators.estimator import AbstractEstimator
+from idbench.identify.estimators.estimator import AbstractEstimator, Need
 from idbench.identify.estimators.problem import Problem
 from idbench.identify.estimators.simulating.row_products import Solved
-from idbench.identify.estimators.simulator import AbstractLoop, Simulated
+from idbench.identify.estimators.simulator import Simulated
 from idbench.identify.estimators.solution import AbstractSolution
 from idbench.identify.iterate import by_run, iterate, not_converged
 from idbench.identify.models import ExplicitModel
@@ -48,12 +48,7 @@ class SecantSteps:
     def taken(self, X: Array, G: Array, unit: Array) -> tuple[Array, Array]:
         """Return an upper bound of the remaining distance [units], shape (...), and the start of the next step, shape (..., p).
 
-        Parameters
-        ----------
-        X, G : Array, shape (..., p)
-            Parameters before and after the round.
-        unit : Array, shape (..., p)
-            What a step counts in, such as sigma.
+        X and G are the parameters before and after the round; a step counts in `unit`, such as sigma, shape (..., p) each.
         """
         before, self._before = self._before, (X, G)
         step = (G - X) / unit
@@ -108,21 +103,8 @@ class Rounds:
     def until_settled(self, step: Callable[[Array], Solved], X: Array, steps: SecantSteps | None = None) -> Solved:
         """Return the solution of `step` that does not move any more; runs that have converged are left as they are.
 
-        A round whose controller was made for the simulated robot is not the last: the real one was not.
-
-        Parameters
-        ----------
-        step : callable
-            Makes a round from parameters, shape (..., p).
-        X : Array, shape (..., p)
-            Where it begins.
-        steps : SecantSteps, optional
-            Remaining distance and start of the next step; by default the move and the end of the last one.
-
-        Raises
-        ------
-        IdentificationError
-            If every run fails; the reason of the first.
+        A round whose controller was made for the simulated robot is not the last: the real one was not. It begins at X, shape
+        (..., p). By default, remaining distance and start of the next step are the move and the end of the last one.
         """
         found: Solved | None = None
         move = np.full(X.shape, np.inf)
@@ -164,7 +146,9 @@ class Rounds:
         In the first round the controller knows the robot, so that it follows the motion, however far off the start is.
         """
         self._informed = not self.simulations.any()
-        found = loop_of(self.problem).repeat(np.nan_to_num(X), informed=self._informed, exact=self.exact)
+        loop = self.problem.simulation.loop
+        assert loop is not None  # an estimator says that it needs one
+        found = loop.repeat(np.nan_to_num(X), informed=self._informed, exact=self.exact)
         extra = X.ndim - 1 - self.simulations.ndim
         for place, why in found.failures.items():
             if self.active[place[extra:]]:  # one that has converged stays
@@ -220,6 +204,7 @@ class Rounds:
 class AbstractSimulating(AbstractEstimator):
     """An estimator that simulates the robot in rounds."""
 
+    needs: ClassVar[frozenset[Need]] = frozenset({"rows", "loop"})
     begins: ClassVar[bool] = True
 
     rounds: int = 15
@@ -253,17 +238,11 @@ def starting_point(problem: Problem) -> Array:
     return np.broadcast_to(problem.simulation.start, shape).astype(np.float64)
 
 
-def loop_of(problem: Problem) -> AbstractLoop:
-    """Return the closed loop of a problem; raise IdentificationError if it has none."""
-    if problem.simulation.loop is None:
-        raise IdentificationError("the closed loop of the log is not known: give the scenario that simulates it (--loop)")
-    return problem.simulation.loop
-
-
 def rates(problem: Problem) -> list[tuple[slice, float]]:
     """Rows of each log, and their rate [1/s]."""
     maps = problem.rows.maps
-    return [(problem.rows.of_log(k), part.signals.fs / part.grid.step) for k, part in enumerate(maps)]
+    ends = np.cumsum([part.rows for part in maps]).tolist()
+    return [(slice(end - part.rows, end), part.signals.fs / part.grid.step) for part, end in zip(maps, ends, strict=True)]
 
 
 def small_steps(problem: Problem) -> Array:

@@ -135,7 +135,7 @@ class IirLowPass(AbstractLowPass):
 
     def halo(self, fs: float) -> float:
         """Return the settling time of one pass."""
-        return _halo(self, fs)
+        return settling_time(_sections(self, fs), fs)
 
     def window(self, fs: float, grid: Grid) -> Window:
         """Return the filter, run over all samples."""
@@ -170,8 +170,3 @@ def _response(f: IirLowPass, fs: float) -> Array:
     impulse = np.zeros(6 * reach + 1)
     impulse[3 * reach] = 1.0
     return frozen(forward_backward(_sections(f, fs), impulse)[2 * reach : 4 * reach + 1])
-
-
-@lru_cache(maxsize=16)
-def _halo(f: IirLowPass, fs: float) -> float:
-    return settling_time(_sections(f, fs), fs)

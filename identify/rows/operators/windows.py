@@ -2,7 +2,7 @@
 
 from abc import abstractmethod
 from dataclasses import dataclass
-from typing import NamedTuple, final
+from typing import final
 
 import numpy as np
 
@@ -34,16 +34,6 @@ class Samples(AbstractLowPass):
         return np.ones(1)
 
 
-class Kernels(NamedTuple):
-    """Weights of the samples k - before, k - before + 1, ... in the row of sample k."""
-
-    integral: Array
-    """Weights of B tau and c."""
-
-    derivative: Array
-    """Weights of e, which give the integral of s e without differentiating."""
-
-
 class AbstractWeakForm(AbstractOperator):
     """Rows that are integrals over a stretch of time, s e integrated by parts, so that no velocity is differentiated.
 
@@ -52,31 +42,31 @@ class AbstractWeakForm(AbstractOperator):
     """
 
     @abstractmethod
-    def kernels(self, fs: float) -> Kernels:
-        """Return the weights of both integrals, of equal length, for signals sampled at `fs` [Hz]."""
+    def kernels(self, fs: float) -> tuple[Array, Array]:
+        """Weights, of equal length, of B tau and c, and of e, which integrate s e without differentiating it."""
 
     @final
     def halo(self, fs: float) -> float:
         """Return half the length of a stretch."""
-        return len(self.kernels(fs).integral) / 2 / fs
+        return len(self.response(fs)) / 2 / fs
 
     @final
     def map(self, equations: Equations, weight: Array, grid: Grid) -> RowMap:
         """Return the integrals, weighted; a row is void if its stretch touches a masked instant, or at most `SEEN` is left."""
         kernels = self.kernels(equations.signals.fs)
-        length = len(kernels.integral)
+        length = len(kernels[0])
         before = (length - 1) // 2
         integral, derivative = (Kernel(kernel, before, grid) for kernel in kernels)
         touched = Kernel(np.ones(length), before, grid).apply((weight == 0).astype(np.float64))
         mean = Kernel(np.full(length, 1 / length), before, grid).apply(weight)
         outside = mean * ((touched == 0) & (mean**2 > SEEN))
         ones, by_parts = np.ones_like(weight), derivative if equations.differentiates else None
-        return RowMap(equations.signals, equations.B, grid, integral, by_parts, ones, outside, kernels.integral)
+        return RowMap(equations.signals, equations.B, grid, integral, by_parts, ones, outside, kernels[0])
 
     @final
     def response(self, fs: float) -> Array:
         """Return the weights of B tau."""
-        return self.kernels(fs).integral
+        return self.kernels(fs)[0]
 
 
 @dataclass(frozen=True)
@@ -107,12 +97,12 @@ class Windows(AbstractWeakForm):
             )
         return samples
 
-    def kernels(self, fs: float) -> Kernels:
+    def kernels(self, fs: float) -> tuple[Array, Array]:
         """Return Simpson's rule, and the difference of the window's ends."""
         intervals = self.samples(fs)
         ends = np.zeros(intervals + 1)
         ends[0], ends[-1] = -1.0, 1.0
-        return Kernels(_simpson(intervals) / fs, ends)
+        return _simpson(intervals) / fs, ends
 
 
 def _simpson(intervals: int) -> Array:
@@ -149,7 +139,7 @@ class ModulatingFunctions(AbstractWeakForm):
         """Return the samples between functions, at least 1."""
         return max(1, round(self.spacing * fs))
 
-    def kernels(self, fs: float) -> Kernels:
+    def kernels(self, fs: float) -> tuple[Array, Array]:
         """Return phi, and -d phi/dt from the integration by parts."""
         half = self.support * fs / 2
         if half < self.degree:
@@ -161,4 +151,4 @@ class ModulatingFunctions(AbstractWeakForm):
         u = np.arange(-reach, reach + 1) / half
         phi = (1 - u**2) ** self.degree
         slope = -2 * self.degree * u * (1 - u**2) ** (self.degree - 1) * fs / half
-        return Kernels(phi / phi.sum(), -slope / phi.sum())
+        return phi / phi.sum(), -slope / phi.sum()
