@@ -24,7 +24,8 @@ from idbench.experiments.identification.reading import ReadLog, file_of, late, r
 from idbench.experiments.identification.robot_model import SCARA, RobotModel, absolute
 from idbench.experiments.requests import jobs
 from idbench.experiments.requests.shared import ColumnOptions, LogRequest, MountingOptions, Parameters
-from idbench.experiments.requests.table import request_from, request_keys
+from idbench.experiments.requests.table import request_from
+from idbench.experiments.requests.words import request_keys
 from idbench.identify import BLOCKS, CHAINS, ESTIMATORS, MODELS, MotionLog
 from idbench.identify.plugins import Table, did_you_mean
 from idbench.sim.engine.simulation import simulate as simulated
