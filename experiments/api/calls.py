@@ -148,7 +148,8 @@ def fit(
     if model is not None:
         model = _with_keys(model, asked, table)
     else:
-        model = RobotModel(_name_of(asked), asked.parameters, asked.mounting.mounting)
+        name = robot_of(asked).name if asked.log else absolute(asked.robot or SCARA)
+        model = RobotModel(name, asked.parameters, asked.mounting.mounting)
     request = request_of(asked, model)
     _require_truth(truth, model)
     loaded = prepared(_read(logs, asked, model), request, sought=sought, band=chooses_band(asked))
@@ -219,11 +220,6 @@ def _others(groups: Sequence[type], *, but: bool = False) -> set[str]:
     """Return the keys of requests of logs that are not those of some groups; `but`: those that are."""
     own = {key for group in groups for key in request_keys(group)}
     return own if but else request_keys(LogRequest).keys() - own
-
-
-def _name_of(asked: jobs.IdentifyRequest) -> str:
-    """Return the robot that is named, or that of the run, or the SCARA."""
-    return robot_of(asked).name if asked.log else absolute(asked.robot or SCARA)
 
 
 def _require_logs(logs: Sequence[Any], held_out: Sequence[Any], keys: Mapping[str, Any]) -> None:
