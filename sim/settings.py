@@ -117,7 +117,8 @@ def _complaint(detail: Any, cls: type, where: str) -> str:
         return f"key {key!r} is missing" + (f": {meaning}" if meaning else "")
     if kind == "value_error":
         return ": ".join(filter(None, [key, str(detail["ctx"]["error"])]))
-    return f"{key} = {detail['input']!r:.60}: {_allowed(detail)}" + (f" ({meaning})" if meaning else "")
+    allowed = str(detail["msg"]).replace("Input should be", "must be").replace("Value error, ", "")
+    return f"{key} = {detail['input']!r:.60}: {allowed}" + (f" ({meaning})" if meaning else "")
 
 
 def _written(location: list[Any]) -> str:
@@ -125,21 +126,13 @@ def _written(location: list[Any]) -> str:
     return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in location).lstrip(".")
 
 
-def _allowed(detail: Any) -> str:
-    return str(detail["msg"]).replace("Input should be", "must be").replace("Value error, ", "")
-
-
 def _owner(cls: type, path: list[str]) -> type:
     """Return the class of settings that a path of keys ends in."""
     for key in path:
-        inner = [a for a in _annotations(cls, key) if hasattr(a, "__pydantic_fields__")]
-        cls = inner[0] if inner else cls
+        annotation = getattr(fields_of(cls).get(key), "annotation", None)
+        parts = (annotation, *getattr(annotation, "__args__", ()))
+        cls = next((part for part in parts if hasattr(part, "__pydantic_fields__")), cls)
     return cls
-
-
-def _annotations(cls: type, key: str) -> list[Any]:
-    field = fields_of(cls).get(key)
-    return [] if field is None else [field.annotation, *getattr(field.annotation, "__args__", ())]
 
 
 def fields_of(cls: type) -> dict[str, Any]:
