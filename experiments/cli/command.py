@@ -39,14 +39,7 @@ class Command:
 def command_of(options: Any, *, out: bool = False, absolute: bool = False) -> str:
     """Command line of a request: all that differs from the defaults, but for what only shows or writes its results.
 
-    Parameters
-    ----------
-    options : dataclass
-        Options of a command that does a job.
-    out : bool
-        Whether the folder of the results is named, too.
-    absolute : bool
-        Whether files are named from the root: then the same command reads the same files.
+    `out` names the folder of the results, too; `absolute` names files from the root: the same command reads the same files.
     """
     folder = ["--out", quote(str(options.out))] if out and options.out else []
     return " ".join([program(), options.called, *_words(options, request_type(options), absolute), *folder])

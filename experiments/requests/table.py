@@ -17,20 +17,9 @@ Request = TypeVar("Request")
 def request_from(
     request: type[Request], table: Mapping[str, Any], where: str, folder: Path | None = None, taken: Container[str] = ()
 ) -> Request:
-    """Return a request with the values of a table.
+    """Return a request with the values of a table, which messages call `where`, and whose files are in a folder.
 
-    Parameters
-    ----------
-    request : type
-        Its class.
-    table : mapping
-        Values by the keys of the request.
-    where : str
-        What messages call the table.
-    folder : Path, optional
-        Where files are that the table names.
-    taken : container of str
-        Keys that the table does not have.
+    Keys that are `taken` are none of the table.
 
     Raises
     ------
