@@ -3,7 +3,6 @@
 import ast
 import inspect
 import tomllib
-from collections.abc import Callable
 from functools import cache, wraps
 from itertools import pairwise
 from pathlib import Path
@@ -60,19 +59,17 @@ def settings(cls: C) -> C:
     The docstring below a field is its description. A ValueError of `__post_init__` is reported as well.
     """
     made = dataclass(frozen=True, config=_CHECKED)(cls)
-    made.__init__ = _reporting(made.__init__, made)  # type: ignore[method-assign]  # pydantic's own errors, in our words
-    return made  # type: ignore[return-value]
+    init = made.__init__
 
-
-def _reporting(init: Callable[..., None], cls: type) -> Callable[..., None]:
     @wraps(init)
     def checked(self: object, *args: object, **kwargs: object) -> None:
         try:
             init(self, *args, **kwargs)
         except ValidationError as error:
-            raise ScenarioError("; ".join(complaints(error, cls))) from None
+            raise ScenarioError("; ".join(complaints(error, made))) from None
 
-    return checked
+    made.__init__ = checked  # type: ignore[method-assign]  # pydantic's own errors, in our words
+    return made  # type: ignore[return-value]
 
 
 def read_toml(path: Path, what: str, kind: type[Exception] = ScenarioError) -> dict[str, Any]:

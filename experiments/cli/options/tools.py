@@ -120,7 +120,7 @@ class DescribeRobot(Command, called="robot", action="robot:describe"):
 
 
 @dataclass(frozen=True)
-class WriteScenario(Command, called="scenario", action="scenario:write"):
+class WriteScenario(Command, called="scenario", action="list:write_scenario"):
     """Write a scenario to a file, with every setting explained. Without a name: list the shipped scenarios."""
 
     name: ThisScenario = None
