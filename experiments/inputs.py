@@ -6,8 +6,7 @@ from typing import Any
 from idbench.experiments.identification.job import robot_of
 from idbench.experiments.identification.reading import file_of
 from idbench.experiments.requests import jobs
-from idbench.experiments.requests.table import request_keys
-from idbench.experiments.requests.words import Word
+from idbench.experiments.requests.words import request_keys, word_of
 from idbench.sim.robot.robot import Robot
 
 
@@ -15,8 +14,7 @@ def files_of(asked: Any) -> tuple[Path, ...]:
     """The files that are read, by the marks of the request: nothing may be written over them."""
     found = dict[Path, None]()
     for place, hint in request_keys(jobs.request_type(asked)).values():
-        what = next((mark.file for mark in getattr(hint, "__metadata__", ()) if isinstance(mark, Word)), "")
-        value = asked
+        what, value = word_of(hint).file, asked
         for name in place:
             value = getattr(value, name)
         for each in value if isinstance(value, tuple) else (value,):

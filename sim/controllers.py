@@ -97,17 +97,7 @@ class AbstractClosedLoop(AbstractController):
 
 
 class Error:
-    """Control error e = q_ref - q and its low-passed difference quotient.
-
-    Parameters
-    ----------
-    reference : Reference
-        The planned motion.
-    nsim : int
-        Number of simulations.
-    cutoff : float
-        Of the first-order low-pass on the difference quotient [Hz].
-    """
+    """Control error e = q_ref - q and its difference quotient, behind a first-order low-pass of `cutoff` [Hz]."""
 
     def __init__(self, reference: Reference, nsim: int, cutoff: float) -> None:
         self._reference = reference

@@ -3,7 +3,6 @@
 import ast
 import inspect
 import tomllib
-from collections.abc import Callable
 from functools import cache, wraps
 from itertools import pairwise
 from pathlib import Path
@@ -60,19 +59,17 @@ def settings(cls: C) -> C:
     The docstring below a field is its description. A ValueError of `__post_init__` is reported as well.
     """
     made = dataclass(frozen=True, config=_CHECKED)(cls)
-    made.__init__ = _reporting(made.__init__, made)  # type: ignore[method-assign]  # pydantic's own errors, in our words
-    return made  # type: ignore[return-value]
+    init = made.__init__
 
-
-def _reporting(init: Callable[..., None], cls: type) -> Callable[..., None]:
     @wraps(init)
     def checked(self: object, *args: object, **kwargs: object) -> None:
         try:
             init(self, *args, **kwargs)
         except ValidationError as error:
-            raise ScenarioError("; ".join(complaints(error, cls))) from None
+            raise ScenarioError("; ".join(complaints(error, made))) from None
 
-    return checked
+    made.__init__ = checked  # type: ignore[method-assign]  # pydantic's own errors, in our words
+    return made  # type: ignore[return-value]
 
 
 def read_toml(path: Path, what: str, kind: type[Exception] = ScenarioError) -> dict[str, Any]:
@@ -117,7 +114,8 @@ def _complaint(detail: Any, cls: type, where: str) -> str:
         return f"key {key!r} is missing" + (f": {meaning}" if meaning else "")
     if kind == "value_error":
         return ": ".join(filter(None, [key, str(detail["ctx"]["error"])]))
-    return f"{key} = {detail['input']!r:.60}: {_allowed(detail)}" + (f" ({meaning})" if meaning else "")
+    allowed = str(detail["msg"]).replace("Input should be", "must be").replace("Value error, ", "")
+    return f"{key} = {detail['input']!r:.60}: {allowed}" + (f" ({meaning})" if meaning else "")
 
 
 def _written(location: list[Any]) -> str:
@@ -125,21 +123,13 @@ def _written(location: list[Any]) -> str:
     return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in location).lstrip(".")
 
 
-def _allowed(detail: Any) -> str:
-    return str(detail["msg"]).replace("Input should be", "must be").replace("Value error, ", "")
-
-
 def _owner(cls: type, path: list[str]) -> type:
     """Return the class of settings that a path of keys ends in."""
     for key in path:
-        inner = [a for a in _annotations(cls, key) if hasattr(a, "__pydantic_fields__")]
-        cls = inner[0] if inner else cls
+        annotation = getattr(fields_of(cls).get(key), "annotation", None)
+        parts = (annotation, *getattr(annotation, "__args__", ()))
+        cls = next((part for part in parts if hasattr(part, "__pydantic_fields__")), cls)
     return cls
-
-
-def _annotations(cls: type, key: str) -> list[Any]:
-    field = fields_of(cls).get(key)
-    return [] if field is None else [field.annotation, *getattr(field.annotation, "__args__", ())]
 
 
 def fields_of(cls: type) -> dict[str, Any]:

@@ -24,7 +24,8 @@ from idbench.experiments.identification.reading import ReadLog, file_of, late, r
 from idbench.experiments.identification.robot_model import SCARA, RobotModel, absolute
 from idbench.experiments.requests import jobs
 from idbench.experiments.requests.shared import ColumnOptions, LogRequest, MountingOptions, Parameters
-from idbench.experiments.requests.table import request_from, request_keys
+from idbench.experiments.requests.table import request_from
+from idbench.experiments.requests.words import request_keys
 from idbench.identify import BLOCKS, CHAINS, ESTIMATORS, MODELS, MotionLog
 from idbench.identify.plugins import Table, did_you_mean
 from idbench.sim.engine.simulation import simulate as simulated
@@ -147,7 +148,8 @@ def fit(
     if model is not None:
         model = _with_keys(model, asked, table)
     else:
-        model = RobotModel(_name_of(asked), asked.parameters, asked.mounting.mounting)
+        name = robot_of(asked).name if asked.log else absolute(asked.robot or SCARA)
+        model = RobotModel(name, asked.parameters, asked.mounting.mounting)
     request = request_of(asked, model)
     _require_truth(truth, model)
     loaded = prepared(_read(logs, asked, model), request, sought=sought, band=chooses_band(asked))
@@ -218,11 +220,6 @@ def _others(groups: Sequence[type], *, but: bool = False) -> set[str]:
     """Return the keys of requests of logs that are not those of some groups; `but`: those that are."""
     own = {key for group in groups for key in request_keys(group)}
     return own if but else request_keys(LogRequest).keys() - own
-
-
-def _name_of(asked: jobs.IdentifyRequest) -> str:
-    """Return the robot that is named, or that of the run, or the SCARA."""
-    return robot_of(asked).name if asked.log else absolute(asked.robot or SCARA)
 
 
 def _require_logs(logs: Sequence[Any], held_out: Sequence[Any], keys: Mapping[str, Any]) -> None:

@@ -13,8 +13,8 @@ from idbench.experiments.cli.interruption import importing
 def main(args: Sequence[str] | None = None) -> int:
     """Run the command line; return its exit code: 0, 2 for wrong input, 130 when interrupted."""
     with importing():
-        import idbench.experiments.cli.options  # noqa: F401  # all commands register
         from idbench.experiments.cli.app import run
+        from idbench.experiments.cli.options import jobs, tools  # noqa: F401  # in the order of the help: all commands register
     return run(args)
 
 

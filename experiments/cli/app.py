@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from importlib.metadata import version
 
+from idbench.experiments.cli.command import COMMANDS
 from idbench.experiments.cli.interruption import INTERRUPTED, Notice, TerminatedError, importing, noticing, terminating
 from idbench.experiments.errors import ExperimentError, is_told, reason, report, visible
 
@@ -26,8 +27,6 @@ idbench: identify the dynamics of robots, on simulated data whose truth is known
   idbench new scenario mine       begin a scenario, a study or a plug-in of your own
   idbench list, idbench --help    what can be combined, all commands"""
 """What `idbench` alone prints."""
-
-COMMANDS: dict[str, type] = {}  # The commands by name
 
 ENVIRONMENT = {
     "MUJOCO_GL": "disable",  # nothing is drawn by MuJoCo, and what would draw takes a tenth of a second to load
@@ -80,17 +79,6 @@ def _require_memory() -> None:
                 f"this process may have {1e-9 * limit:.2g} GB of address space (ulimit -v), idbench needs {LEAST_MEMORY:g} "
                 "GB: raise it, as in ulimit -v unlimited"
             )
-
-
-def command(name: str) -> Callable[[type], type]:
-    """Return a decorator that registers options as a command."""
-
-    def register(options: type) -> type:
-        COMMANDS[name] = options
-        options.called = name  # type: ignore[attr-defined]  # of a Command
-        return options
-
-    return register
 
 
 def _do(command: Callable[[], None]) -> None:

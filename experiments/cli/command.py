@@ -8,9 +8,11 @@ from shlex import quote
 from typing import Any, ClassVar, TypeVar, get_type_hints
 
 from idbench.experiments.cli.interruption import importing
-from idbench.experiments.cli.parser import word_of
 from idbench.experiments.program import program
 from idbench.experiments.requests.jobs import request_type
+from idbench.experiments.requests.words import word_of
+
+COMMANDS: dict[str, type] = {}  # The commands by name
 
 
 class Command:
@@ -21,8 +23,10 @@ class Command:
     called: ClassVar[str] = ""
     """Name of the command."""
 
-    def __init_subclass__(cls, action: str = "") -> None:
-        cls.action = action or cls.action
+    def __init_subclass__(cls, called: str = "", action: str = "") -> None:
+        if called:
+            cls.called, cls.action = called, action
+            COMMANDS[called] = cls
 
     def __call__(self) -> None:
         """Do the work."""
@@ -35,14 +39,7 @@ class Command:
 def command_of(options: Any, *, out: bool = False, absolute: bool = False) -> str:
     """Command line of a request: all that differs from the defaults, but for what only shows or writes its results.
 
-    Parameters
-    ----------
-    options : dataclass
-        Options of a command that does a job.
-    out : bool
-        Whether the folder of the results is named, too.
-    absolute : bool
-        Whether files are named from the root: then the same command reads the same files.
+    `out` names the folder of the results, too; `absolute` names files from the root: the same command reads the same files.
     """
     folder = ["--out", quote(str(options.out))] if out and options.out else []
     return " ".join([program(), options.called, *_words(options, request_type(options), absolute), *folder])

@@ -18,7 +18,7 @@ from cyclopts.exceptions import CoercionError, CycloptsError, MissingArgumentErr
 
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.program import program
-from idbench.experiments.requests.words import Word
+from idbench.experiments.requests.words import Word, plain_of, request_keys, word_of
 
 ALL = "--help-all"
 HELP = ("-h", "--help")
@@ -78,12 +78,12 @@ def _marked(options: type, shown: Container[str] | None, group: Group) -> type:
     for each in fields(options):
         hint = hints[each.name]
         word = word_of(hint)
-        if (inner := group_of(hint)) is not None:
-            of = Group(f"Options: {each.name}", help=texts.get(each.name, ""), sort_key=5)
-            annotations[each.name] = Annotated[_marked(inner, shown, of), Parameter(name="*")]
+        plain, whole = plain_of(hint), _stated(hint) is int
+        if hasattr(plain, "__dataclass_fields__"):
+            of = Group(f"Options: {each.name}", help=texts.get(each.name) or plain.__doc__, sort_key=5)
+            annotations[each.name] = Annotated[_marked(plain, shown, of), Parameter(name="*")]
             space[each.name] = field(default_factory=get_args(annotations[each.name])[0], kw_only=True)
             continue
-        plain, whole = _plain(hint), _stated(hint) is int
         several = get_origin(plain) is tuple
         parameter = Parameter(
             name=_names(each.name, word) or None,
@@ -110,7 +110,7 @@ def _marked(options: type, shown: Container[str] | None, group: Group) -> type:
 
 def _stated(hint: Any) -> Any:
     """The type of a value that is given: without None."""
-    plain = _plain(hint)
+    plain = plain_of(hint)
     kinds = get_args(plain) if get_origin(plain) in (Union, UnionType) else (plain,)
     return next(kind for kind in kinds if kind is not type(None))
 
@@ -123,21 +123,6 @@ def _unmarked(made: Any) -> Any:
     """Options as the class that they are."""
     values = {f.name: getattr(made, f.name) for f in fields(made)}
     return type(made).__mro__[1](**{name: _unmarked(x) if is_dataclass(x) else x for name, x in values.items()})
-
-
-def group_of(hint: Any) -> Any:
-    """The dataclass of a group of options, or None of a single one."""
-    first = _plain(hint)
-    return first if is_dataclass(first) else None
-
-
-def word_of(hint: Any) -> Word:
-    """How a value of a type is typed."""
-    return next((mark for mark in getattr(hint, "__metadata__", ()) if isinstance(mark, Word)), Word())
-
-
-def _plain(hint: Any) -> Any:
-    return get_args(hint)[0] if get_origin(hint) is Annotated else hint
 
 
 def every_command(commands: Mapping[str, type], description: str) -> App:
@@ -168,7 +153,7 @@ def parsed(words: Sequence[str], commands: Mapping[str, type], description: str)
     if asked:
         app.help_print([])
         if essential and ALL not in asked:
-            print(f"{_hidden(options, essential)} more options: idbench {name} {ALL}")  # noqa: T201  # as the library prints
+            print(f"{sum(key not in essential for key in request_keys(options))} more options: idbench {name} {ALL}")  # noqa: T201  # as the library prints
         return None
     _require_once(rest)
     _require_values(rest, options)
@@ -187,13 +172,6 @@ def parsed(words: Sequence[str], commands: Mapping[str, type], description: str)
 def _made(app: App, words: Sequence[str]) -> Any:
     made, bound, _ = app.parse_args(words, exit_on_error=False, print_error=False)
     return made(*bound.args, **bound.kwargs)
-
-
-def _hidden(options: type, names: Container[str]) -> int:
-    """How many options are not shown."""
-    hints = get_type_hints(options, include_extras=True)
-    inner = {each.name: group_of(hints[each.name]) for each in fields(options)}
-    return sum(_hidden(group, names) if group else name not in names for name, group in inner.items())
 
 
 def _require_command(words: Sequence[str], commands: Mapping[str, type]) -> None:
@@ -293,15 +271,12 @@ def _wanted(argument: Any) -> str:
 
 def _options(command: Any) -> Iterator[tuple[str, Any]]:
     """The options of a command and their types, those of its groups, too."""
-    hints = get_type_hints(command, include_extras=True)
-    for each in fields(command):
-        hint, word = _plain(hints[each.name]), word_of(hints[each.name])
-        if is_dataclass(hint):
-            yield from _options(hint)
-        elif not word.positional:
-            names = _names(each.name, word)
-            off = [f"--no-{names[0][2:]}"] if hint is bool and not word.flag else []
-            yield from ((option, hint) for option in (*names, *off))
+    for key, (_, hint) in request_keys(command).items():
+        word, plain = word_of(hint), plain_of(hint)
+        if not word.positional:
+            names = _names(key, word)
+            off = [f"--no-{names[0][2:]}"] if plain is bool and not word.flag else []
+            yield from ((option, plain) for option in (*names, *off))
 
 
 def _names(field_name: str, word: Word) -> list[str]:

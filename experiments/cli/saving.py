@@ -20,18 +20,7 @@ Files = Mapping[str, Callable[[Path], object]]
 def saved(page: Page, folder: ResultsFolder, summary: dict[str, Any], files: Files, hint: str) -> Iterator[Attempts]:
     """Show what is printed, save the results, and give what tries their views in the block; then say where they are.
 
-    Parameters
-    ----------
-    page : Page
-        What is printed.
-    folder : ResultsFolder
-        Where the results go.
-    summary : dict
-        What summary.json says.
-    files : mapping of str to callable
-        Logs, scenarios and the like that belong to the results.
-    hint : str
-        How to go on, said behind the name of the folder.
+    `summary` becomes summary.json; `hint` says how to go on, behind the name of the folder.
     """
     page.found |= summary | {"folder": str(folder.out)}
     page.show()

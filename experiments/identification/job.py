@@ -12,7 +12,7 @@ from idbench.experiments.identification.fit import Fit
 from idbench.experiments.identification.fitting import fit
 from idbench.experiments.identification.friction_choice import summary, words
 from idbench.experiments.identification.iterations import iterations
-from idbench.experiments.identification.load import Loaded, in_band, load, with_held_out
+from idbench.experiments.identification.load import in_band, load, with_held_out
 from idbench.experiments.identification.log_warnings import unchanging, warnings_of_log
 from idbench.experiments.identification.logs import Logs
 from idbench.experiments.identification.method import Method
@@ -79,14 +79,9 @@ def robot_of(asked: IdentifyRequest) -> RobotModel:
     return RobotModel(str(known or SCARA), asked.parameters, asked.mounting.mounting, assumed=known is None)
 
 
-def read_logs(asked: IdentifyRequest, request: Request) -> Loaded:
-    """Return the logs of the fit, and the request with the band that suits them."""
-    return load(asked.log, asked, request, band=chooses_band(asked))
-
-
 def loaded_logs(asked: IdentifyRequest, request: Request) -> tuple[Request, Logs]:
     """Return the request with the band that suits the logs, and the logs, those that are held out among them."""
-    loaded = read_logs(asked, request)
+    loaded = load(asked.log, asked, request, band=chooses_band(asked))
     return loaded.request, with_held_out(loaded, asked, truth_of(asked, request))
 
 

@@ -153,22 +153,10 @@ def _names(every: Sequence[ReadLog]) -> list[str]:
 def load(
     paths: Sequence[Path], options: LogRequest, request: Request, *, band: bool, more: int = 0, alike: int | None = None
 ) -> Loaded:
-    """Return logs of one fit.
+    """Return logs of one fit, from files or folders of runs; `band` says whether the band is to suit short logs.
 
-    Parameters
-    ----------
-    paths : sequence of Path
-        Their files, or folders of runs.
-    options : LogRequest
-        How they are read.
-    request : Request
-        What is asked for.
-    band : bool
-        Whether the band is to suit short logs.
-    more : int
-        Parameters that are identified beside those of the basis.
-    alike : int, optional
-        How many logs, from the first on, are of the robot without a payload: these show the delay of all. All by default.
+    `more` parameters are identified beside those of the basis; the first `alike` logs, all by default, are of the robot without
+    a payload: these show the delay of all.
     """
     require_different(paths)
     with stage("reading logs"):

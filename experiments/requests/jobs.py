@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from idbench.experiments.requests.shared import CHAIN, ESTIMATOR, LogRequest, MountingOptions, Parameters
 from idbench.experiments.requests.words import (
@@ -11,22 +11,16 @@ from idbench.experiments.requests.words import (
     File,
     Files,
     Folder,
-    Letters,
     Logs,
-    Percent,
     Real,
     Robot,
     Scenario,
-    Scenarios,
-    Six,
     Start,
     Texts,
     ThisRobot,
     ThisScenario,
     Url,
     Vector,
-    Way,
-    Weights,
     Word,
 )
 
@@ -48,7 +42,7 @@ class IdentifyRequest(LogRequest):
     wdyn: float | None = None
     """Bandwidth of the position loop [Hz]; sampling and filter frequencies are printed as multiples of it. Default: that of
     the controller of a run's folder, else the bandwidth of the motion."""
-    loop: Scenarios = ()
+    loop: Annotated[tuple[str, ...], Word("SCENARIO", file="name")] = ()
     """Scenario of the control loop of each log, for IV, DIDIM, CLIE and CLOE: robot, motion, controller, timing, drive.
     Default: that of the run's folder."""
     start: Start = "least-squares"
@@ -69,7 +63,7 @@ class KnownOptions:
     """Its mass [kg]."""
     at: Vector = None
     """Its centre of mass in the frame of the last link [m]."""
-    inertia: Six = None
+    inertia: Annotated[tuple[float, float, float, float, float, float] | None, Word("XX YY ZZ XY XZ YZ")] = None
     """Its inertia about the centre of mass, in the axes of that frame [kg m^2]."""
 
 
@@ -82,7 +76,6 @@ class LoadRequest(LogRequest):
     unloaded: Files = ()
     """Logs without the payload."""
     known: KnownOptions = KnownOptions()  # frozen
-    """What is known of the payload."""
     simulate: Scenario = None
     """Simulate a scenario with and without its payload instead of reading logs, and compare the result with the true values."""
     runs: Count = None
@@ -95,7 +88,7 @@ class PayloadRequest(LoadRequest):
 
     before: File = None
     """A robot identified earlier (`idbench identify --write FILE.json`), instead of logs without the payload."""
-    way: Way = "together"
+    way: Literal["all", "together", "fixed", "apart", "difference"] = "together"
     """together: all logs in one fit (best); fixed: first the robot, then the payload; apart: two fits, subtracted; difference:
     of the torques of one repeated motion; all: compare them."""
     gain_sigma: Each = ()
@@ -124,7 +117,7 @@ class ServoRequest:
     friction: Annotated[str, Word("LAW")] = "load"
     """Friction law: coulomb, stribeck, load, load-stribeck, directional, quadratic, gear; auto compares them, and takes the
     simplest that no other predicts significantly better."""
-    find: Letters = ()
+    find: Annotated[tuple[str, ...], Word("LETTER")] = ()
     """Further parameters to be found: lag, lead, dead_band, backlash, gain_error, scale_error, zero, bias, Mg, Fo; a of a loop
     that commands torques."""
     hold: Texts = ()
@@ -138,7 +131,6 @@ class ServoRequest:
     rows: Texts = ()
     """Use only rows in which columns have these values: episode_index=3."""
     mounting: MountingOptions = MountingOptions()  # noqa: RUF009  # frozen
-    """How the robot is mounted."""
     validate: Files = ()
     """Held-out logs, simulated from their commands alone. Default: the last log, where there are several."""
 
@@ -173,18 +165,17 @@ class ExciteRequest:
     """Largest speed [rad/s, m/s], for all joints or for each. Overrides --limits and the file. MJCF files usually have none."""
     acceleration: Each = ()
     """Largest acceleration [rad/s^2, m/s^2], for all joints or for each."""
-    weigh: Weights = ()
+    weigh: Annotated[tuple[str, ...], Word("NAME=WEIGHT")] = ()
     """Weights of parameters in the mean of ln sigma, such as LMY2=4."""
     criterion: str = "sigma"
     """sigma: the mean of ln sigma, after the determinant; determinant: only that; for comparison: condition, birdy,
     smallest."""
-    until: Percent = None
+    until: Annotated[str | None, Word("PERCENT")] = None
     """Design, run and identify motions on the simulated robot until one sigma of each parameter contributes less than this
     share of a brisk motion's torque, such as 0.1%."""
     seed: int = 0
     """Seed of random motions and of the search. The same seed gives the same motion."""
     parameters: Parameters = Parameters()  # noqa: RUF009  # frozen
-    """Which parameters are identified."""
 
 
 @dataclass(frozen=True)
@@ -210,7 +201,6 @@ class RunRequest:
     """Another robot: name of a shipped one, or a file (MJCF or URDF). A trajectory that does not fit it is replaced by random
     moves."""
     parameters: Parameters = Parameters()  # noqa: RUF009  # frozen
-    """Which parameters are identified."""
 
 
 @dataclass(frozen=True)

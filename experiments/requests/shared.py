@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from idbench.experiments.requests.words import Delay, Each, File, Hertz, Joints, Laws, Names, Robot, Texts, Torque, Vector, Word
+from idbench.experiments.requests.words import Delay, Each, File, Hertz, Joints, Names, Robot, Texts, Torque, Vector, Word
 
 if TYPE_CHECKING:
     from idbench.sim.robot.mounting import Mounting
@@ -31,7 +31,7 @@ class Parameters:
     that; by default the log decides); Ia3=0.1:30%, Fs=file:20% (of all joints), armatures=file:30%, ZZR1=3:0.2 with a sigma."""
     tie: Annotated[tuple[str, ...], Word("NAME=NAME")] = ()
     """Parameters that are equal, such as those of the same motor in two joints: Ia1=Ia4 Fv1=Fv4."""
-    friction: Laws = ("standard",)
+    friction: Annotated[tuple[str, ...], Word("[JOINT=]LAW+LAW")] = ("standard",)
     """Friction laws: standard (viscous and Coulomb), none (torques measured at the links), asymmetric, or a sum such as
     standard+load+stribeck; for one joint: 2=standard+load. auto chooses those that predict held-out stretches best; smooth adds
     smooth functions of velocity, of a size that the log decides, to standard+load, in seconds. `idbench
@@ -108,11 +108,8 @@ class LogRequest:
     unwrap: bool = False
     """Unwrap 2 pi jumps of the angles."""
     reading: ColumnOptions = ColumnOptions()  # frozen
-    """What the columns are."""
     mounting: MountingOptions = MountingOptions()  # frozen
-    """How the robot is mounted."""
     parameters: Parameters = Parameters()  # frozen
-    """Which parameters are identified."""
     mask_speed: Each = ()
     """Speed below which a joint counts as resting or reversing, for all joints or for each [rad/s, m/s]; such instants are
     masked. Default: 5 % of its rms speed or 4 times the noise of its velocity, and 2 or 4 times that where stretches left out

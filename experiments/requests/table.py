@@ -3,49 +3,23 @@
 from collections.abc import Container, Mapping
 from dataclasses import fields, replace
 from pathlib import Path
-from typing import Annotated, Any, TypeVar, get_args, get_origin, get_type_hints
+from typing import Any, TypeVar
 
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from idbench.experiments.errors import ExperimentError
-from idbench.experiments.requests.words import Word
+from idbench.experiments.requests.words import plain_of, request_keys, word_of
 from idbench.identify.plugins import did_you_mean
 
 Request = TypeVar("Request")
-
-Place = tuple[str, ...]
-"""Where a key is: the names of the group and the field."""
-
-
-def request_keys(request: Any) -> dict[str, tuple[Place, Any]]:
-    """Return the keys of a request, those of its groups among them: where each is, and its type."""
-    found = dict[str, tuple[Place, Any]]()
-    for name, hint in get_type_hints(request, include_extras=True).items():
-        inner = get_args(hint)[0] if get_origin(hint) is Annotated else hint
-        if hasattr(inner, "__dataclass_fields__"):
-            found |= {key: ((name, *place), type_) for key, (place, type_) in request_keys(inner).items()}
-        elif name in request.__dataclass_fields__:
-            found[name] = (name,), hint
-    return found
 
 
 def request_from(
     request: type[Request], table: Mapping[str, Any], where: str, folder: Path | None = None, taken: Container[str] = ()
 ) -> Request:
-    """Return a request with the values of a table.
+    """Return a request with the values of a table, which messages call `where`, and whose files are in a folder.
 
-    Parameters
-    ----------
-    request : type
-        Its class.
-    table : mapping
-        Values by the keys of the request.
-    where : str
-        What messages call the table.
-    folder : Path, optional
-        Where files are that the table names.
-    taken : container of str
-        Keys that the table does not have.
+    Keys that are `taken` are none of the table.
 
     Raises
     ------
@@ -64,16 +38,12 @@ def request_from(
     return request(**values, **{name: replace(defaults[name], **inner) for name, inner in groups.items()})  # type: ignore[type-var]
 
 
-def _plain(hint: Any) -> Any:
-    return get_args(hint)[0] if get_origin(hint) is Annotated else hint
-
-
 def _checked(where: str, hint: Any, value: Any) -> Any:
     """Return a value as the type of its field has it: one for several, and a number for a text that may be one, are taken."""
-    plain = str(_plain(hint))
+    plain = str(plain_of(hint))
     if "tuple" in plain and isinstance(value, str | int | float | Path) and not isinstance(value, bool):
         value = (value,)
-    if _plain(hint) in (str, str | None) and isinstance(value, int | float | Path) and not isinstance(value, bool):
+    if plain_of(hint) in (str, str | None) and isinstance(value, int | float | Path) and not isinstance(value, bool):
         value = str(value)
     several = value if isinstance(value, list | tuple) else (value,)
     if "bool" not in plain and any(isinstance(each, bool) for each in several):
@@ -88,14 +58,10 @@ def _checked(where: str, hint: Any, value: Any) -> Any:
 
 def _in_folder(value: Any, hint: Any, folder: Path | None) -> Any:
     """Return a file's name from the folder of the table; names of what ships stay."""
-    if folder is None or not _names_file(hint):
+    if folder is None or not word_of(hint).file:
         return value
     if isinstance(value, tuple):
         return tuple(_in_folder(each, hint, folder) for each in value)
     if isinstance(value, Path):
         return folder / value
     return str(folder / value) if value and Path(value).suffix else value
-
-
-def _names_file(hint: Any) -> bool:
-    return any(isinstance(mark, Word) and mark.file for mark in getattr(hint, "__metadata__", ()))

@@ -82,7 +82,9 @@ class _Amplifier(AbstractAmplifier):
             current = (charge + target * rest - away * lost) / dt
         else:
             away = i0 - target
-            left, lost = self._wholly(steps)
+            if steps not in self._known:
+                self._known[steps] = self._relaxed(np.array([steps * self._h]))
+            left, lost = self._known[steps]
             current = (target * dt - away * lost) / dt
         self._i = target + away * left
         self.trace = demand, limited, current, i0, self._i, e, saturated
@@ -91,11 +93,6 @@ class _Amplifier(AbstractAmplifier):
     def _relaxed(self, rest: Array) -> tuple[Array, Array]:
         """Decay of a deviation after a time [s], exp(-w t), and minus its integral, (exp(-w t) - 1) / w."""
         return np.exp(-self._w * rest), np.expm1(-self._w * rest) / self._w
-
-    def _wholly(self, steps: int) -> tuple[Array, Array]:
-        if steps not in self._known:
-            self._known[steps] = self._relaxed(np.array([steps * self._h]))
-        return self._known[steps]
 
     def electric(self, trace: Trace, dt: Array) -> Electric:
         demand, reference, current, i0, i1, e, saturated = trace

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from idbench.identify.compiled import compiled
-from idbench.sim.drives.loops import Loops, PeriodTable, Windings
+from idbench.sim.drives.winding import Loops, PeriodTable, Windings
 from idbench.sim.robot.motors import Array
 
 

@@ -14,17 +14,7 @@ def within(x: Array, limit: float | Array) -> Array:
 
 
 class Profile:
-    """Targets at work.
-
-    Parameters
-    ----------
-    rate : float
-        Largest speed [rad/s].
-    acceleration : float
-        Largest acceleration [rad/s^2].
-    h : float
-        Step [s].
-    """
+    """Targets that follow commands within a rate [rad/s] and an acceleration [rad/s^2], in steps of `h` [s]."""
 
     def __init__(self, rate: float, acceleration: float, h: float) -> None:
         self._rate = rate

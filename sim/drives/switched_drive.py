@@ -9,9 +9,8 @@ from pydantic import Field
 
 from idbench.sim.drives.averaged_drive import limits
 from idbench.sim.drives.drive import AbstractAmplifier, AbstractDrive, BetweenEdges, Electric, Trace, every
-from idbench.sim.drives.loops import Loops, PeriodTable, Windings
 from idbench.sim.drives.pwm import Modulation, Modulator, pieces, within
-from idbench.sim.drives.winding import Winding, pass_period, straight, stretches
+from idbench.sim.drives.winding import Loops, PeriodTable, Winding, Windings, pass_period, straight, stretches
 from idbench.sim.errors import ScenarioError
 from idbench.sim.robot.motors import Array, Motors
 from idbench.sim.robot.robot import Robot

@@ -45,17 +45,7 @@ class Clock:
 
 
 class History:
-    """Positions and velocities of the last physics steps, as many as `reach`.
-
-    Parameters
-    ----------
-    reach : int
-        Steps to look back.
-    nsim, n : int
-        Number of simulations and joints.
-    h : float
-        Physics step [s].
-    """
+    """Positions and velocities of the last `reach` physics steps of `h` [s], of `nsim` simulations of `n` joints."""
 
     def __init__(self, reach: int, nsim: int, n: int, h: float) -> None:
         self._h = h

@@ -86,10 +86,8 @@ def free_run(robot: Robot, log: MotionLog, qd: Array, length: float) -> tuple[Ar
 
     Parameters
     ----------
-    robot : Robot
-        To be simulated.
-    log : MotionLog
-        One run.
+    robot, log
+        To be simulated, and one run.
     qd : Array, shape (time, joint)
         Velocities of the log [rad/s].
     length : float
@@ -125,8 +123,6 @@ def shoot(
 
     Parameters
     ----------
-    robot : Robot
-        The robot.
     vary : mapping of str to array_like
         Fields of MuJoCo's model with a value for each simulation, shape (nsim, ...).
     states : tuple of Array, shape (nsim, joint)

@@ -20,17 +20,7 @@ ADVICE = (
 
 
 class Bounds:
-    """Where a loop at work keeps its joints, and how fast.
-
-    Parameters
-    ----------
-    robot : Robot
-        What is simulated.
-    planned : Reference
-        Where it should go, in all simulations or in each.
-    nsim : int
-        Number of simulations.
-    """
+    """Where a loop at work keeps its joints, and how fast, about the motion planned for all `nsim` simulations or for each."""
 
     def __init__(self, robot: Robot, planned: Reference, nsim: int) -> None:
         low, high = planned.q.min(axis=0), planned.q.max(axis=0)
@@ -65,15 +55,7 @@ class Bounds:
 
 
 class Failures:
-    """The simulations of a run that have failed, each by itself.
-
-    Parameters
-    ----------
-    robot, planned
-        As for `Bounds`.
-    seeds : sequence of int
-        Of the simulations.
-    """
+    """The simulations of a run that have failed, each by itself."""
 
     def __init__(self, robot: Robot, planned: Reference, seeds: Sequence[int]) -> None:
         self.reasons: dict[int, str] = {}

@@ -34,16 +34,7 @@ class GearedPlant(Plant):
     """Two hinges (or slides) a joint: the drive's torque, armature and friction act on the first, the link turns on the second.
 
     MuJoCo solves the contact at the ends of the play together with all else, so that it is stable however light the link is;
-    a dead zone in the drive would need steps as short as the lightest link wants.
-
-    Parameters
-    ----------
-    robot : Robot
-        The robot without play.
-    model : mujoco.MjModel
-        The robot with play.
-    nsim, scenario, h, threads
-        As for `plant_of`.
+    a dead zone in the drive would need steps as short as the lightest link wants. `robot` has no play, its `model` has it.
     """
 
     has_play = True

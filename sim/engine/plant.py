@@ -28,22 +28,9 @@ SWITCHED_OFF = (
 
 
 class Plant:
-    """Simulations of a robot whose joints are driven by torques; its actuators are switched off.
+    """Simulations of a robot whose joints are driven by torques, in steps of `h` [s]; its actuators are switched off.
 
-    Parameters
-    ----------
-    robot : Robot
-        The robot.
-    nsim : int
-        Number of simulations.
-    physics : Physics
-        Integrator.
-    h : float
-        Physics step [s].
-    vary : mapping of str to array_like
-        Fields of MuJoCo's model with a value for each simulation, shape (nsim, ...).
-    threads : int
-        Native threads; 0 for all processors.
+    `vary` has fields of MuJoCo's model with a value for each simulation, shape (nsim, ...); no threads are all processors.
     """
 
     has_play: ClassVar[bool] = False

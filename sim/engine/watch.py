@@ -87,20 +87,10 @@ class Step(NamedTuple):
 
 
 class Watcher:
-    """Collects what the motors do, and hands on what has become final.
+    """Collects what the motors do, and hands on what has become final, from sample `skipped` on, where the log begins.
 
-    Parameters
-    ----------
-    watch : Watch
-        Who receives it.
-    scenario : Scenario
-        What is run.
-    h : float
-        Physics step [s].
-    skipped : int
-        Samples before the log begins.
-    logged : callable
-        Gives what the log says of the torques of one stretch after the other, shape (1, time, joint).
+    `h` is the physics step [s]; `logged` gives what the log says of the torques of one stretch after the other, shape
+    (1, time, joint).
     """
 
     def __init__(self, watch: Watch, scenario: Scenario, h: float, skipped: int, logged: Callable[[Array], Array]) -> None:

@@ -37,17 +37,9 @@ class Touch:
 class Clearance:
     """Distances between the shapes of a robot that could meet, by MuJoCo.
 
-    Of each link the shapes count that are marked for collisions, or all where none is. Neighbouring links are left out, and
-    pairs that are nearer than they may be whatever the posture.
-
-    Parameters
-    ----------
-    robot : Robot
-        With what stands around it: whatever is fixed to the world counts.
-    ranges : Array, shape (joint, 2)
-        Lowest and highest position [rad].
-    least : float
-        Distance that shapes must keep [m].
+    Of each link the shapes count that are marked for collisions, or all where none is, and of the world whatever is fixed to
+    it. Neighbouring links are left out, and pairs that are nearer than `least` [m] at all of many random positions within the
+    ranges [rad], shape (joint, 2).
     """
 
     def __init__(self, robot: Robot, ranges: Array, least: float) -> None:

@@ -18,16 +18,8 @@ class InverseDynamics:
     """M(q) qdd + bias - passive forces [N m] of many states at once, all from MuJoCo, without `frictionloss`.
 
     This is `mj_inverse` without its constraint forces. With `frictionloss`, `mj_inverse` takes the sign of the friction
-    from qd plus a share of qdd, so that joints that brake get the wrong one; damping, a passive force, is right.
-
-    Parameters
-    ----------
-    robot : Robot
-        The arm.
-    count : int
-        Number of states of every call.
-    vary : mapping of str to array_like, optional
-        Fields of MuJoCo's model with a value for each state, shape (state, ...).
+    from qd plus a share of qdd, so that joints that brake get the wrong one; damping, a passive force, is right. Every call has
+    `count` states; `vary` has fields of MuJoCo's model with a value for each, shape (state, ...).
     """
 
     def __init__(self, robot: Robot, count: int, vary: Mapping[str, npt.ArrayLike] | None = None) -> None:

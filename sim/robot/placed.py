@@ -62,11 +62,6 @@ class PlacedLink:
     drive: dict[str, float]
     """Ia, Fv, Fs, K of the joint, where they are known."""
 
-    @property
-    def slides(self) -> bool:
-        """Whether its joint does."""
-        return self.joint.kind == "slide"
-
 
 def placed_links(robot: Robot, tree: KinematicTree, standard: Mapping[str, float]) -> Iterator[PlacedLink]:
     """Yield the links of a robot with standard parameters, parents first."""

@@ -88,13 +88,7 @@ def _mesh(model: mujoco.MjModel, m: int) -> tuple[Array, npt.NDArray[np.int32]]:
 
 
 class Mover:
-    """Moves the bodies of a robot; for the next motion of as many instants it is ready.
-
-    Parameters
-    ----------
-    robot : Robot
-        What is moved.
-    """
+    """Moves the bodies of a robot; for the next motion of as many instants it is ready."""
 
     def __init__(self, robot: Robot) -> None:
         self._model, self._size = robot.model, -1

@@ -87,16 +87,7 @@ def with_servos(
     MuJoCo's `dcmotor` with input="pos" drives V = clip((R/K) kp (u - q), Vmax): the servo's law, with kp = g kp V a,
     kd = K^2/R, which cancels its compensation of the back-EMF, slewmax the rate limit, and a delayed command. `position` writes
     `<position>` instead, for older versions: stiffness, damping and a force range, without rate limit and delay, and without
-    the fall of the torque with speed at full duty.
-
-    Parameters
-    ----------
-    name, folder, mounting
-        As for `rewritten`.
-    servos : mapping of int to ServoValues
-        By the number of the joint.
-    position : bool
-        Write `<position>`.
+    the fall of the torque with speed at full duty. `servos` are by the number of the joint; the rest is as for `rewritten`.
 
     Raises
     ------
@@ -192,16 +183,9 @@ class Commands:
 
 
 def replay(name: str, text: str, folder: Path, sent: Commands, q0: Array) -> Array:
-    """Return the positions that plain MuJoCo gives for commands, shape (time, joint).
+    """Positions that plain MuJoCo gives for commands [rad], shape (time, joint), from q0 on, shape (joint,).
 
-    Parameters
-    ----------
-    name, text, folder
-        A robot, its file with servos, and where that finds its meshes.
-    sent : Commands
-        What the servos are sent.
-    q0 : Array, shape (joint,)
-        Positions at the beginning.
+    `text` is the file of the robot with servos, `folder` where that finds its meshes.
 
     Raises
     ------

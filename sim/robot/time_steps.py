@@ -28,6 +28,8 @@ def apparent_rotor_inertia(robot: Robot) -> Array:
 def torque_of_steps(robot: Robot, motion: Sequence[Array]) -> Array:
     """Difference of a simulation's torques from those of the motion through its positions, shape (time, joint) [N m, N].
 
+    `motion` has the logged positions [rad] and their first four derivatives, shape (time, joint) each.
+
     MuJoCo steps by v(k+1) = v(k) + h a(k), q(k+1) = q(k) + h v(k+1), so that a(k) is the acceleration at q(k), and v(k) the
     velocity half a step before. Its implicit integrators take forces that depend on velocities at the end of the step, where
     `qfrc_actuator` has them at its beginning:
@@ -38,13 +40,6 @@ def torque_of_steps(robot: Robot, motion: Sequence[Array]) -> Array:
     with the Coriolis torques of v(k+1) by `implicit`; Euler takes the joints' damping alone at the end, and not even that if
     `eulerdamp` is disabled. Nothing is said of Runge-Kutta, by which a control acts for a whole step, and what it meets changes
     within.
-
-    Parameters
-    ----------
-    robot : Robot
-        As its file describes it.
-    motion : sequence of Array, shape (time, joint)
-        Logged positions [rad] and their first four derivatives.
     """
     q, qd, qdd, jerk, snap = motion
     if _is(robot, mujoco.mjtIntegrator.mjINT_RK4):

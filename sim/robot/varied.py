@@ -25,14 +25,8 @@ def model_fields(robot: Robot, standard: Mapping[str, Array]) -> dict[str, Array
     """Return the fields of MuJoCo's model of robots with other standard parameters, shape (nsim, ...) each.
 
     The inertia of a link stands at the body that its joint moves; bodies that are welded to it become massless. A link need not
-    be one that can exist: its torques are what its parameters say, as long as M(q) is positive definite.
-
-    Parameters
-    ----------
-    robot : Robot
-        The robot whose parameters they are.
-    standard : mapping of str to Array, shape (nsim,)
-        Values by the names of `standard_parameters`; those that it leaves out stay.
+    be one that can exist: its torques are what its parameters say, as long as M(q) is positive definite. `standard` has values
+    of shape (nsim,) by the names of `standard_parameters`; those that it leaves out stay.
 
     Raises
     ------
@@ -75,17 +69,7 @@ def vary_fields(batch: Batch, fields: Mapping[str, npt.ArrayLike]) -> None:
 
 
 class VariedRobots(Sequence[Robot]):
-    """Robots of which fields of MuJoCo's model vary, each made when it is asked for.
-
-    Parameters
-    ----------
-    robot : Robot
-        What they have in common.
-    nsim : int
-        How many.
-    vary : mapping of str to array_like
-        Fields of MuJoCo's model with a value for each, shape (nsim, ...).
-    """
+    """Robots of which fields of MuJoCo's model vary, shape (nsim, ...), each made when it is asked for."""
 
     def __init__(self, robot: Robot, nsim: int, vary: Mapping[str, npt.ArrayLike]) -> None:
         self._robot, self._vary = robot, vary

@@ -49,7 +49,7 @@ def _link(model: ElementTree.Element, link: PlacedLink) -> None:
 
 def _joint(model: ElementTree.Element, link: PlacedLink) -> None:
     joint = ElementTree.SubElement(
-        model, "joint", {"name": link.joint.name, "type": "prismatic" if link.slides else "revolute"}
+        model, "joint", {"name": link.joint.name, "type": "prismatic" if link.joint.kind == "slide" else "revolute"}
     )
     _text(joint, "parent", link.parent)
     _text(joint, "child", link.name)

@@ -60,7 +60,7 @@ def _made(robot: Robot, tree: KinematicTree, standard: Mapping[str, float]) -> E
     ElementTree.SubElement(root, "link", {"name": BASE})
     for link in placed_links(robot, tree, standard):
         _give(ElementTree.SubElement(root, "link", {"name": link.name}), link.body)
-        kind = "prismatic" if link.slides else "revolute" if _bounded(link) else "continuous"
+        kind = "prismatic" if link.joint.kind == "slide" else "revolute" if _bounded(link) else "continuous"
         joint = ElementTree.SubElement(root, "joint", {"name": link.joint.name, "type": kind})
         ElementTree.SubElement(joint, "origin", {"xyz": numbers(link.place), "rpy": numbers(link.angles)})
         ElementTree.SubElement(joint, "parent", {"link": link.parent})

@@ -1,5 +1,3 @@
 """What is simulated: the settings of a scenario, and its file."""
 
-from idbench.sim.scenario.scenario import Physics as Physics
-from idbench.sim.scenario.scenario import Scenario as Scenario
 from idbench.sim.scenario.scenario import Timing as Timing

@@ -26,8 +26,8 @@ from idbench.experiments.errors import ExperimentError, is_told, reason, report
 from idbench.experiments.exports.exports import EXPORTS
 from idbench.experiments.identification.fit import Fit
 from idbench.experiments.identification.fitting import fit
-from idbench.experiments.identification.job import fit_of, read_logs, request_of
-from idbench.experiments.identification.load import with_held_out
+from idbench.experiments.identification.job import chooses_band, fit_of, request_of
+from idbench.experiments.identification.load import load, with_held_out
 from idbench.experiments.identification.logs import Logs
 from idbench.experiments.identification.reading import ReadLog, file_of, late, read_as
 from idbench.experiments.identification.request import Request
@@ -125,7 +125,7 @@ class SetFit(NamedTuple):
 def fitted(folder: Path, definition: Definition, asked: IdentifyRequest) -> SetFit:
     """The fit of a set; without held-out logs, of all but the last quarter of its longest."""
     begin = time.perf_counter()
-    loaded = read_logs(asked, request_of(asked))
+    loaded = load(asked.log, asked, request_of(asked), band=chooses_band(asked))
     logs = with_held_out(loaded, asked, None)
     if definition.held_out:
         logs = replace(logs, held_out=dict(zip(definition.held_out, (logs.held_out or {}).values(), strict=True)))

@@ -5,10 +5,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from idbench.sim.drives import SwitchedDrive
-from idbench.sim.drives.loops import Loops, Windings
 from idbench.sim.drives.pwm import Modulator, pieces
 from idbench.sim.drives.switched_drive import ExactPassages, TabulatedPassages
-from idbench.sim.drives.winding import Winding, pass_period, stretches
+from idbench.sim.drives.winding import Loops, Winding, Windings, pass_period, stretches
 from idbench.sim.robot.robot import Robot
 
 V, R, L, T = 160.0, 3.0, 0.012, 2e-4

@@ -2,7 +2,8 @@
 
 from rich.text import Text
 
-from idbench.experiments.cli.app import COMMANDS, DESCRIPTION
+from idbench.experiments.cli.app import DESCRIPTION
+from idbench.experiments.cli.command import COMMANDS
 from idbench.experiments.cli.options.tools import Completion
 from idbench.experiments.cli.parser import every_command
 from idbench.experiments.results.page import Page

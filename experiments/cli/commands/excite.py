@@ -17,7 +17,7 @@ from idbench.experiments.inputs import files_of
 from idbench.experiments.judgement.warnings import FILE, warnings_of_robot
 from idbench.experiments.program import program
 from idbench.experiments.recording.audience import Audience
-from idbench.experiments.reports.excite import print_excited, print_sequence
+from idbench.experiments.reports.excite import print_excited, print_sequence, report
 from idbench.experiments.results.folder import ResultsFolder
 from idbench.experiments.results.page import Page, progress_of
 from idbench.identify.files.log_file import write_log
@@ -45,7 +45,7 @@ def excite(options: Excite) -> None:
         what, hint = command.removeprefix(f"{program()} excite "), options.watching.hint(folder.out)
         summary = found.summary() | {"path": what} | (sequence.summary() if sequence else {})
         with saved(page, folder, summary, _files(found, sequence), hint) as attempts:
-            attempts.file("report.html", lambda: _report(found, command))
+            attempts.file("report.html", lambda: report(found, command))
             if options.watching.rerun:
                 attempts.recording(lambda: _recorded(found, audience))
         page.print(f"try it on the simulated robot: {program()} run {folder.out / 'scenario.toml'}", soft_wrap=True)
@@ -58,12 +58,6 @@ def _files(found: Excited, sequence: MotionSequence | None) -> Files:
         files[f"log{number}.parquet"] = partial(write_log, each.log)
         files[f"motion{number}.csv"] = partial(write_motion, each.excited)
     return files | {"motion.csv": partial(write_motion, found), "scenario.toml": partial(write_scenario, found.scenario)}
-
-
-def _report(found: Excited, command: str) -> str:
-    from idbench.experiments.reports.excite import report
-
-    return report(found, command)
 
 
 def _recorded(found: Excited, audience: Audience | None) -> "Streams":

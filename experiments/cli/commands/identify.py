@@ -61,7 +61,8 @@ def identify(options: Identify) -> None:
         with Attempts(kept, folder) as attempts:
             try:
                 _save(folder, page, result)
-                judgement = attempts.attempt("the verdict", lambda: _judged(result, options))
+                with stages_of("judging" if options.validate else "judging, by a fit of the rest"):
+                    judgement = attempts.attempt("the verdict", lambda: judge(result))
                 warnings = {} if judgement is None else _checked(judgement, options, attempts)
             except BaseException:  # whatever ends it, the estimates are worth keeping
                 _show_fit(page, result, options, whole_models)
@@ -89,11 +90,6 @@ def _checked(judgement: Judgement, options: Identify, attempts: Attempts) -> Map
     with stages_of("checking"):
         delay = delay_method(options.torque_delay) is None
         return attempts.attempt("the checks", lambda: checks(judgement, delay=delay, trials=not options.no_trials)) or {}
-
-
-def _judged(result: Fit, options: Identify) -> Judgement:
-    with stages_of("judging" if options.validate else "judging, by a fit of the rest"):
-        return judge(result)
 
 
 def _followed(stack: ExitStack, options: Identify, request: Request, audience: Audience | None) -> Identify:

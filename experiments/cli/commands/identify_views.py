@@ -1,6 +1,6 @@
 """What shows an identification: report, recording, files for other software; each may fail alone."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,7 +9,6 @@ from rich.text import Text
 from idbench.experiments.cli.options.jobs import Identify
 from idbench.experiments.errors import ExperimentError, ResultsError
 from idbench.experiments.exports.exports import EXPORTS
-from idbench.experiments.identification.fit import Fit
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.judgement.conclusion import Conclusion
 from idbench.experiments.judgement.judgement import Judgement
@@ -41,15 +40,10 @@ class Shown:
     audience: Audience | None
     """Who watches."""
 
-    @property
-    def fit(self) -> Fit:
-        """The fit."""
-        return self.judgement.fit
-
 
 def report(shown: Shown, attempts: Attempts) -> None:
     """Write the page of the identification."""
-    if shown.folder is None or shown.fit.logs.long:
+    if shown.folder is None or shown.judgement.fit.logs.long:
         return
     from idbench.experiments.reports.page import report as page_of
 
@@ -57,36 +51,28 @@ def report(shown: Shown, attempts: Attempts) -> None:
     shown.folder.add("report.html", text)
 
 
-def recording(shown: Shown, attempts: Attempts) -> None:
+def recording(shown: Shown) -> None:
     """Write the recording, or show it to who watches."""
-    del attempts
     run, rerun = shown.options.log[0], shown.options.watching.rerun
-    into = shown.folder or (_layered(shown, run) if has_recording(run) else None)
+    layered = (run / RECORDING).is_file()  # the folder of a run, whose recording gets a layer
+    into = shown.folder or (ResultsFolder(run, "run", shown.command, shown.options.force) if layered else None)
     if not rerun or (into is None and shown.audience is None):
         return
-    if shown.fit.logs.long:
+    if shown.judgement.fit.logs.long:
         shown.page.print("not recorded: the rows of such a long log are not kept; identify a part of it to look inside")
         return
     from idbench.experiments.recording.identification_recording import add_layer, record_log
     from idbench.experiments.results.attempts import write_streams
 
     alone = shown.folder is not None or into is None
-    made = record_log(shown.fit.on(0), shown.audience) if alone else add_layer(run, shown.fit, shown.audience)
+    made = (
+        record_log(shown.judgement.fit.on(0), shown.audience) if alone else add_layer(run, shown.judgement.fit, shown.audience)
+    )
     write_streams(made, into)
-    if len(shown.fit.logs.fitted) > 1:
-        shown.page.print(f"recorded: {shown.fit.logs.name(0)}, by the estimate of all logs")
+    if len(shown.judgement.fit.logs.fitted) > 1:
+        shown.page.print(f"recorded: {shown.judgement.fit.logs.name(0)}, by the estimate of all logs")
     if into and not shown.folder:
         shown.page.print(f"added to the recording in {run}{shown.options.watching.hint(run)}", soft_wrap=True)
-
-
-def has_recording(run: Path) -> bool:
-    """True if a log is the folder of a run with a recording, to which layers can be added."""
-    return (run / RECORDING).is_file()
-
-
-def _layered(shown: Shown, run: Path) -> ResultsFolder:
-    """Return the folder of a run whose recording gets a layer."""
-    return ResultsFolder(run, "run", shown.command, shown.options.force)
 
 
 def require_layer(options: Identify, label: str, command: str) -> None:
@@ -94,26 +80,22 @@ def require_layer(options: Identify, label: str, command: str) -> None:
     name, run = f"recording.{label}.rrd", options.log[0]
     if not run.is_dir() or options.out or not options.watching.rerun:
         return
-    if not has_recording(run) and options.label:
+    recorded = (run / RECORDING).is_file()
+    if not recorded and options.label:
         raise ExperimentError(f"there is no {RECORDING} in {run}, to which --label {label} could add: run it anew")
-    if options.force or not has_recording(run):
+    if options.force or not recorded:
         return
-    there = Manifest.of(options.log[0]).files.get(name)
-    if there is not None and there.command != command and (options.log[0] / name).is_file():
+    there = Manifest.of(run).files.get(name)
+    if there is not None and there.command != command and (run / name).is_file():
         raise ExperimentError(
-            f"{options.log[0]} holds the layer {label!r} of `{there.command}`: choose another --label, or replace it with "
-            "--force"
+            f"{run} holds the layer {label!r} of `{there.command}`: choose another --label, or replace it with --force"
         )
-
-
-VIEWS: dict[str, Callable[[Shown, Attempts], None]] = {"report.html": report, "the recording": recording}
-"""What shows an identification, by name."""
 
 
 def view_all(shown: Shown, attempts: Attempts) -> None:
     """Make every view; those that fail are noted."""
-    for name, view in VIEWS.items():
-        attempts.attempt(name, lambda view=view: view(shown, attempts))  # type: ignore[misc]
+    attempts.attempt("report.html", lambda: report(shown, attempts))
+    attempts.attempt("the recording", lambda: recording(shown))
     told = set[str]()
     for option, path in _targets(shown.options):
         attempts.attempt(f"{option} {path}", lambda option=option, path=path: _export(shown, option, path, told))  # type: ignore[misc]
@@ -128,7 +110,7 @@ def view_all(shown: Shown, attempts: Attempts) -> None:
 def _export(shown: Shown, option: str, path: Path, told: set[str]) -> None:
     """Write a file for other software, with the parameters of the first model that has an estimate."""
     export = EXPORTS[path.suffix]
-    made = export.render(shown.fit, shown.fit.leading, path)
+    made = export.render(shown.judgement.fit, shown.judgement.fit.leading, path)
     if path not in made.texts:  # a folder of files
         folder_for(path, option)
     for target, text in made.texts.items():
@@ -137,7 +119,7 @@ def _export(shown: Shown, option: str, path: Path, told: set[str]) -> None:
         else:
             write_text(target, text, option, force=shown.options.force, read=shown.folder.read if shown.folder else ())
     named = ", ".join(map(str, made.texts if path in made.texts else [path]))
-    what = f"{export.what} with the parameters of the {shown.fit.leading} model"
+    what = f"{export.what} with the parameters of the {shown.judgement.fit.leading} model"
     shown.page.print(Text(f"written to {named}: {what}"), soft_wrap=True)
     for note in (note for note in made.notes if note not in told):
         shown.page.print(Text(note), soft_wrap=True)

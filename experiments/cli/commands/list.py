@@ -1,30 +1,44 @@
-"""What can be combined."""
+"""The commands that show what ships: parts that can be combined, and scenarios."""
 
-from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from idbench.experiments.cli.options.tools import List
+from idbench.experiments.cli.options.tools import List, WriteScenario
 from idbench.experiments.plugin_tables import TABLES, plugin_conflicts
+from idbench.experiments.program import program
 from idbench.experiments.results.page import Page
+from idbench.experiments.results.writing import require_free, write_text
 from idbench.identify.plugins import PluginTable
+from idbench.sim.scenario.scenario_file import designed, load, names, to_toml
 
 
 def list_plugins(options: List) -> None:
-    """List every plug-in."""
-    page = Page(machine=options.json)
-    print_plugins(page)
-    page.found |= {table.point: {name: table.summary(name) for name in table} for table in TABLES}
-    page.close()
-
-
-def print_plugins(console: Console) -> None:
     """Print every plug-in with the first line of its documentation."""
+    page = Page(machine=options.json)
     for table in TABLES:
         grid = Table.grid(padding=(0, 2))
         for name in table:
             grid.add_row(f"  {name}", Text(table.summary(name)))
         added = f" (entry points: idbench.{table.point})" if isinstance(table, PluginTable) else ""
-        console.print(Text(f"{table.point}{added}", style="bold"), grid, sep="\n")
+        page.print(Text(f"{table.point}{added}", style="bold"), grid, sep="\n")
     for conflict in plugin_conflicts():
-        console.print(Text(f"warning: {conflict}"), soft_wrap=True)
+        page.print(Text(f"warning: {conflict}"), soft_wrap=True)
+    page.found |= {table.point: {name: table.summary(name) for name in table} for table in TABLES}
+    page.close()
+
+
+def write_scenario(options: WriteScenario) -> None:
+    """Write a scenario out, or list those that ship."""
+    page = Page()
+    if options.name is None:
+        width = max(map(len, names()))
+        for known in names():
+            page.out(f"{known:{width}}  {load(known).origin}")
+        page.out(f"{len(designed())} more for the studies of excitation, such as {designed()[0]}: excited/ROBOT-MOTION")
+    elif options.out is None:
+        page.out(to_toml(load(options.name)).rstrip("\n"))
+    else:
+        require_free(options.out, "--out", force=options.force)
+        write_text(options.out, to_toml(load(options.name)), "--out", force=options.force)
+        page.out(f"written to {options.out}; run it: {program()} run {options.out}")
+    page.close()

@@ -59,9 +59,8 @@ def _page(options: IdentifyPayload | IdentifyGains) -> Iterator[tuple[Page, Resu
     page, folder = Page(machine=options.json), None
     page.found |= {"experiment": options.called}
     if options.out is not None:
-        folder = ResultsFolder(
-            options.out, options.called, command_of(options, absolute=True), options.force, files_of(options)
-        )
+        whole = command_of(options, absolute=True)
+        folder = ResultsFolder(options.out, options.called, whole, options.force, files_of(options))
         folder.check()
     with closing(page), folder.held() if folder else nullcontext():
         yield page, folder

@@ -50,15 +50,13 @@ def show_log(options: ShowLog) -> None:
         with Attempts("the rest is printed") as attempts:
             if options.write:
                 attempts.attempt("--write", lambda: _write(page, options, layout))
-            if options.picture is not None:
-                attempts.attempt("--picture", lambda: _draw(page, options, facts))
+            if (picture := options.picture) is not None:
+                attempts.attempt("--picture", lambda: _draw(page, options, picture, facts))
 
 
-def _draw(page: Page, options: ShowLog, facts: LogFacts) -> None:
+def _draw(page: Page, options: ShowLog, path: Path, facts: LogFacts) -> None:
     from idbench.experiments.reports.log_picture import figure_of
 
-    if (path := options.picture) is None:
-        return
     with new_file(path, "--picture", force=options.force, read=[options.log]) as file:
         try:
             figure_of(facts).savefig(file, dpi=110)
@@ -186,19 +184,15 @@ def export(options: Export) -> None:
         raise ExperimentError(f"there is no log in {options.folder}: name a results folder, such as runs/table1")
     out = options.out or options.folder
     made = folder_for(out, "--out")
+    robot = stated_by(options.folder).get("robot", SCARA)
+    named = "" if robot == SCARA else f" --robot {shlex.quote(robot)}"
     with closing(page):
         for path in logs:
             log, target = read_log(path), made / f"{path.stem}.csv"
             with new_file(target, "--out", force=options.force) as file:
                 _write_log(log, file)
-            options_of = f"--torque {log.torque.meaning} --torque-delay {log.torque.delay:g}{_robot_of(options.folder)}"
+            options_of = f"--torque {log.torque.meaning} --torque-delay {log.torque.delay:g}{named}"
             page.print(f"written to {target}; {program()} identify {target} {options_of}", soft_wrap=True)
-
-
-def _robot_of(folder: Path) -> str:
-    """Return the option that names the robot of a results folder, where it is not the one by default."""
-    robot = stated_by(folder).get("robot", SCARA)
-    return "" if robot == SCARA else f" --robot {shlex.quote(robot)}"
 
 
 def _write_log(log: MotionLog, path: Path, joints: tuple[str, ...] = ()) -> None:

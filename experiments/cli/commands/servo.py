@@ -18,7 +18,6 @@ from idbench.experiments.results.attempts import Attempts
 from idbench.experiments.results.folder import ResultsFolder
 from idbench.experiments.results.page import NOT_SAVED, Page, stages_of
 from idbench.experiments.results.writing import require_free, write_text
-from idbench.experiments.servo.identification import Servos
 from idbench.experiments.servo.job import ServosFit, servos_identified
 from idbench.experiments.servo.joints import Identified
 from idbench.experiments.servo.servo_files import (
@@ -30,7 +29,6 @@ from idbench.experiments.servo.servo_files import (
     without_servo,
 )
 from idbench.experiments.servo.servo_text import choice_table, error_line, servo_table
-from idbench.identify.servo import ServoFit
 from idbench.identify.servo.choice import ServoFrictionChoice
 
 if TYPE_CHECKING:
@@ -39,7 +37,11 @@ if TYPE_CHECKING:
 
 def servo(options: IdentifyServo) -> None:
     """Identify servos."""
-    page, folder = Page(machine=options.json), _folder(options)
+    page, folder = Page(machine=options.json), None
+    if options.out is not None:
+        whole = command_of(options, absolute=True)
+        folder = ResultsFolder(options.out, "servo", whole, options.force, files_of(options))
+        folder.check()
     for option, path, ending in (("--write-mjcf", options.write_mjcf, ".xml"), ("--write", options.write, ".py")):
         if path is not None:
             if path.suffix != ending:
@@ -48,9 +50,6 @@ def servo(options: IdentifyServo) -> None:
     with options.watching.audience() as audience, closing(page), folder.held() if folder else nullcontext():
         page.found |= {"experiment": "servo", "robot": absolute(str(options.robot)), "friction": options.friction, "joints": {}}
         made = _identified(page, folder, options)
-        servos = made.servos
-        others = made.others
-        found = made.fits
         for what, each in made.errors.items():
             for joint, errors in each.items():
                 page.print(Text(error_line(f"{what} logs", joint, errors)), soft_wrap=True)
@@ -61,13 +60,13 @@ def servo(options: IdentifyServo) -> None:
         save_summary(page, folder)
         with Attempts("the results are printed" + (f", and in {folder.out}" if folder else ""), folder) as attempts:
             if options.write_mjcf is not None:
-                attempts.attempt("--write-mjcf", lambda: _write(page, options, servos, others, found))
+                attempts.attempt("--write-mjcf", lambda: _write(page, options, made))
                 attempts.attempt("summary.json", lambda: save_summary(page, folder))
             attempts.file("report.html", lambda: made.document().page(command_of(options, out=True)))
             if options.write is not None:
-                attempts.attempt("--write", lambda: _write_function(page, options, servos, found))
+                attempts.attempt("--write", lambda: _write_function(page, options, made))
             if options.watching.rerun and (folder is not None or audience is not None):
-                attempts.recording(lambda: _recorded(others or servos, found, audience))
+                attempts.recording(lambda: _recorded(made, audience))
         if folder is not None:
             page.print(f"written to {folder.out}{options.watching.hint(folder.out)}", soft_wrap=True)
         else:
@@ -98,20 +97,21 @@ def _identified(page: Page, folder: ResultsFolder | None, options: IdentifyServo
     return made
 
 
-def _write(page: Page, options: IdentifyServo, servos: Servos, others: Servos | None, found: dict[str, ServoFit]) -> None:
+def _write(page: Page, options: IdentifyServo, fit: ServosFit) -> None:
     """Write the robot's MJCF with the servos, and measure it in plain MuJoCo."""
+    servos = fit.servos
     path = options.write_mjcf
     assert path is not None
     place = path.absolute().parent
-    made, found = found, for_mujoco(found)
+    found = for_mujoco(fit.fits)
     text = mjcf_of(servos, found, place, options.position)
     write_text(path, text, "--write-mjcf", force=options.force, read=files_of(options))
     page.print(Text(f"written to {path}: the robot with its servos, to be commanded with angles of the file"), soft_wrap=True)
-    friction = ", ".join(f"{joint} Fs {fit.p['Fs']:.3g} Fv {fit.p['Fv']:.3g}" for joint, fit in found.items() if "Fs" in fit.p)
-    if any(made[joint] is not fit for joint, fit in found.items()):
+    friction = ", ".join(f"{joint} Fs {own.p['Fs']:.3g} Fv {own.p['Fv']:.3g}" for joint, own in found.items() if "Fs" in own.p)
+    if any(fit.fits[joint] is not own for joint, own in found.items()):
         page.print(Text(f"its friction is fitted again as MuJoCo has it: {friction}"), soft_wrap=True)
     page.warn({"the written file": [*inexpressible(found), *without_servo(servos.links.joints, found)]})
-    judged = others or servos
+    judged = fit.others or servos
     for log in judged.logs:
         errors = in_mujoco(judged, found, place, log, options.position)
         name = judged.name(log)
@@ -120,26 +120,19 @@ def _write(page: Page, options: IdentifyServo, servos: Servos, others: Servos | 
             page.print(Text(error_line(f"{path.name} in plain MuJoCo, {name}", joint, np.array([e]))), soft_wrap=True)
 
 
-def _write_function(page: Page, options: IdentifyServo, servos: Servos, found: dict[str, ServoFit]) -> None:
+def _write_function(page: Page, options: IdentifyServo, fit: ServosFit) -> None:
+    servos = fit.servos
     path = options.write
     assert path is not None
-    known = {joint: (servos.known.servo(joint, ""), fit) for joint, fit in found.items()}
+    known = {joint: (servos.known.servo(joint, ""), own) for joint, own in fit.fits.items()}
     text = servo_function(Path(servos.robot).name, known, [log.name for log in servos.logs])
     write_text(path, text, "--write", force=options.force, read=files_of(options))
     page.print(Text(f"written to {path}: the servos as a Python file"), soft_wrap=True)
 
 
-def _recorded(servos: Servos, found: dict[str, ServoFit], audience: Audience | None) -> "Streams":
+def _recorded(fit: ServosFit, audience: Audience | None) -> "Streams":
     from idbench.experiments.recording.servo_recording import record_servos
 
+    servos = fit.others or fit.servos
     path, log = next(iter(servos.logs.items()))
-    return record_servos(servos.links_of(path), path.stem, log, servos.simulated(found, path), audience)
-
-
-def _folder(options: IdentifyServo) -> ResultsFolder | None:
-    if options.out is None:
-        return None
-    command = command_of(options, absolute=True)
-    folder = ResultsFolder(options.out, "servo", command, options.force, files_of(options))
-    folder.check()
-    return folder
+    return record_servos(servos.links_of(path), path.stem, log, servos.simulated(fit.fits, path), audience)

@@ -23,14 +23,20 @@ def view(options: View) -> None:
         page.print(f"the latest of {LATEST}: {folders[0]}", soft_wrap=True)
     if options.save is None:
         page.close()
-        open_viewer(folders, options.tab)
+        _open(folders, options.tab)
         return
-    save(folders, options.tab, options.save, force=options.force)
+    if options.save.suffix != ".rrd":
+        raise ResultsError(f"--save {options.save} must end with .rrd")
+    own = options.save.absolute().parent in [folder.absolute() for folder in folders]
+    if options.save.name.startswith("recording.") and own:
+        raise ResultsError(f"--save {options.save} would be a part of the recording itself: choose another name")
+    with new_file(options.save, "--save", force=options.force) as file:
+        _merge(folders, options.tab, file)
     page.print(f"written to {options.save}", soft_wrap=True)
     page.close()
 
 
-def open_viewer(folders: Sequence[Path], tab: str = "") -> None:
+def _open(folders: Sequence[Path], tab: str) -> None:
     """Open recordings of results folders, or a recording itself; return when the viewer is closed.
 
     Raises
@@ -51,17 +57,13 @@ def open_viewer(folders: Sequence[Path], tab: str = "") -> None:
         if len(folders) > 1 or folders[0].is_dir() or tab:
             one = [Path(hidden) / BASE]
             _merge(folders, tab, one[0])
-        _open(one)
-
-
-def save(folders: Sequence[Path], tab: str, out: Path, *, force: bool = False) -> None:
-    """Write the recordings of results folders, layers included, as one file; raise ResultsError if that fails."""
-    if out.suffix != ".rrd":
-        raise ResultsError(f"--save {out} must end with .rrd")
-    if out.name.startswith("recording.") and out.absolute().parent in [folder.absolute() for folder in folders]:
-        raise ResultsError(f"--save {out} would be a part of the recording itself: choose another name")
-    with new_file(out, "--save", force=force) as file:
-        _merge(folders, tab, file)
+        binary = viewer_binary()
+        try:
+            code = subprocess.run([binary, *one, "--bind", LOOPBACK], check=False).returncode
+        except OSError as error:
+            raise ResultsError(f"cannot start the rerun viewer {binary}: {error.strerror}") from error
+    if code:
+        raise ResultsError(f"the rerun viewer ended with code {code}")
 
 
 def _merge(folders: Sequence[Path], tab: str, out: Path) -> None:
@@ -88,13 +90,3 @@ def _paths(folder: Path) -> list[Path]:
         missing = folder / BASE if folder.is_dir() else folder
         raise ResultsError(f"there is no recording {missing}: name a results folder, such as runs/table1, or a .rrd file")
     return paths
-
-
-def _open(paths: list[Path]) -> None:
-    binary = viewer_binary()
-    try:
-        code = subprocess.run([binary, *paths, "--bind", LOOPBACK], check=False).returncode
-    except OSError as error:
-        raise ResultsError(f"cannot start the rerun viewer {binary}: {error.strerror}") from error
-    if code:
-        raise ResultsError(f"the rerun viewer ended with code {code}")

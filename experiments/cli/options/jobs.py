@@ -2,13 +2,12 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
-from idbench.experiments.cli.app import command
 from idbench.experiments.cli.command import Command
 from idbench.experiments.recording.audience import Watching
 from idbench.experiments.requests import jobs
-from idbench.experiments.requests.words import File, Files, Folder, Json, Seconds, Verbose, Window
+from idbench.experiments.requests.words import File, Files, Folder, Json, Verbose, Window, Word
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,12 +27,10 @@ class RecordedOptions(WrittenOptions):
     """Where results go, and how they are watched."""
 
     watching: Watching = Watching()  # noqa: RUF009  # frozen
-    """Live viewing and recording."""
 
 
-@command("run")
 @dataclass(frozen=True, kw_only=True)
-class RunCommand(jobs.RunRequest, RecordedOptions, Command, action="run:run"):
+class RunCommand(jobs.RunRequest, RecordedOptions, Command, called="run", action="run:run"):
     """Simulate a scenario in closed loop, identify it with all models, and record it."""
 
     out: Folder = None
@@ -46,9 +43,8 @@ class RunCommand(jobs.RunRequest, RecordedOptions, Command, action="run:run"):
     """Print details, too: noise, Cond(W), correlations, intervals, iterations."""
 
 
-@command("identify")
 @dataclass(frozen=True, kw_only=True)
-class Identify(jobs.IdentifyRequest, RecordedOptions, Command, action="identify:identify"):
+class Identify(jobs.IdentifyRequest, RecordedOptions, Command, called="identify", action="identify:identify"):
     """Identify a log, or several logs in one fit: columns t, q1, ..., tau1, ... in SI units, or as log.toml states."""
 
     essential: ClassVar[tuple[str, ...]] = (
@@ -59,7 +55,7 @@ class Identify(jobs.IdentifyRequest, RecordedOptions, Command, action="identify:
 
     verbose: Verbose = False
     """Print details, too: noise, Cond(W), correlations, intervals, iterations."""
-    follow: Seconds = None
+    follow: Annotated[float | None, Word("SECONDS")] = None
     """Identify a CSV log while it is being written, until it has not grown for this time, then as a whole. --live or --serve
     show estimates and residuals as they develop."""
     write_mjcf: File = None
@@ -71,18 +67,16 @@ class Identify(jobs.IdentifyRequest, RecordedOptions, Command, action="identify:
     folder of robots: .ensemble."""
 
 
-@command("table1")
 @dataclass(frozen=True, kw_only=True)
-class Table1Command(jobs.Table1Request, RecordedOptions, Command, action="paper:compare"):
+class Table1Command(jobs.Table1Request, RecordedOptions, Command, called="table1", action="paper:compare"):
     """Reproduce the paper's simulation comparison (Table 1) and record it."""
 
     out: Folder = None
     """Folder for summary.json, recording.rrd and log.parquet. Default: runs/table1."""
 
 
-@command("table2")
 @dataclass(frozen=True, kw_only=True)
-class Table2Command(jobs.Table2Request, RecordedOptions, Command, action="paper:table2"):
+class Table2Command(jobs.Table2Request, RecordedOptions, Command, called="table2", action="paper:table2"):
     """Repeat the paper's experiment (Table 2) on the virtual robot, and attribute its errors; takes two minutes."""
 
     out: Path = Path("runs/table2")
@@ -91,9 +85,8 @@ class Table2Command(jobs.Table2Request, RecordedOptions, Command, action="paper:
     """Interval [s] in which signals inside the control loop are recorded at the full rate of the drive, such as 10 10.5."""
 
 
-@command("search")
 @dataclass(frozen=True, kw_only=True)
-class SearchCommand(Command, action="paper:search"):
+class SearchCommand(Command, called="search", action="paper:search"):
     """Search a trajectory with the paper's condition numbers. (`idbench excite` designs better ones.)"""
 
     seed: int = 0
@@ -104,36 +97,32 @@ class SearchCommand(Command, action="paper:search"):
     """Replace an existing file."""
 
 
-@command("excite")
 @dataclass(frozen=True, kw_only=True)
-class Excite(jobs.ExciteRequest, RecordedOptions, Command, action="excite:excite"):
+class Excite(jobs.ExciteRequest, RecordedOptions, Command, called="excite", action="excite:excite"):
     """Design an exciting trajectory within the robot's limits."""
 
     out: Folder = None
     """Folder for motion.csv, scenario.toml, summary.json, report.html and recording.rrd. Default: runs/excited-<robot>."""
 
 
-@command("payload")
 @dataclass(frozen=True, kw_only=True)
-class IdentifyPayload(jobs.PayloadRequest, WrittenOptions, Command, action="loads:payload"):
+class IdentifyPayload(jobs.PayloadRequest, WrittenOptions, Command, called="payload", action="loads:payload"):
     """Identify what the gripper holds: mass, first moments, inertia, from logs with it and logs without it."""
 
     write_mjcf: File = None
     """Write the robot's file with the payload as a physically consistent body."""
 
 
-@command("gains")
 @dataclass(frozen=True, kw_only=True)
-class IdentifyGains(jobs.GainsRequest, WrittenOptions, Command, action="loads:gains"):
+class IdentifyGains(jobs.GainsRequest, WrittenOptions, Command, called="gains", action="loads:gains"):
     """Identify the torque constants of the drives, gears included, from logs of currents with and without a known payload.
 
     Currents are read with --gain as a first guess, or with 1.
     """
 
 
-@command("servo")
 @dataclass(frozen=True, kw_only=True)
-class IdentifyServo(jobs.ServoRequest, RecordedOptions, Command, action="servo:servo"):
+class IdentifyServo(jobs.ServoRequest, RecordedOptions, Command, called="servo", action="servo:servo"):
     """Identify joints under position loops (servos, legs, MuJoCo's actuators) from commands and positions; write them."""
 
     write_mjcf: File = None
@@ -144,9 +133,8 @@ class IdentifyServo(jobs.ServoRequest, RecordedOptions, Command, action="servo:s
     """Write `position` actuators instead, for older versions of MuJoCo."""
 
 
-@command("study")
 @dataclass(frozen=True, kw_only=True)
-class StudyCommand(jobs.StudyRequest, RecordedOptions, Command, action="study:study"):
+class StudyCommand(jobs.StudyRequest, RecordedOptions, Command, called="study", action="study:study"):
     """Run a study: simulate a scenario over a grid and many seeds, and identify each run. Without a name: list the studies."""
 
     out: Folder = None

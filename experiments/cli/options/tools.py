@@ -4,15 +4,25 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
-from idbench.experiments.cli.app import command
 from idbench.experiments.cli.command import Command
 from idbench.experiments.requests.shared import ColumnOptions, MountingOptions, Parameters
-from idbench.experiments.requests.words import Delay, File, Folder, Hertz, Json, Log, ThisRobot, ThisScenario, Torque, Word
+from idbench.experiments.requests.words import (
+    Delay,
+    File,
+    Folder,
+    Hertz,
+    Joints,
+    Json,
+    Log,
+    ThisRobot,
+    ThisScenario,
+    Torque,
+    Word,
+)
 
 
-@command("view")
 @dataclass(frozen=True)
-class View(Command, action="view:view"):
+class View(Command, called="view", action="view:view"):
     """Open the recording of a results folder in the rerun viewer, or overlay those of several."""
 
     folders: Annotated[tuple[Path, ...], Word("DIR|FILE", positional=True)] = ()
@@ -26,9 +36,8 @@ class View(Command, action="view:view"):
     """Replace an existing file."""
 
 
-@command("log")
 @dataclass(frozen=True)
-class ShowLog(Command, action="logs:show_log"):
+class ShowLog(Command, called="log", action="logs:show_log"):
     """Show the contents of a log: columns, units, rate, clock, ranges, noise, encoders. Needs no robot."""
 
     log: Log
@@ -45,9 +54,8 @@ class ShowLog(Command, action="logs:show_log"):
     """Print as JSON; human-readable text goes to the error stream."""
 
 
-@command("resample")
 @dataclass(frozen=True)
-class Resample(Command, action="logs:resample"):
+class Resample(Command, called="resample", action="logs:resample"):
     """Resample a log at a fixed frequency and repair its clock: repeated rows, jitter, missing samples, gaps."""
 
     log: Log
@@ -57,7 +65,6 @@ class Resample(Command, action="logs:resample"):
     fs: Hertz = None
     """Sampling frequency [Hz]. Default: that of the log."""
     reading: ColumnOptions = ColumnOptions()  # noqa: RUF009  # frozen
-    """What the columns are."""
     torque: Torque = None
     """What a torque sample means. Required unless the file states it. A held torque becomes averaged."""
     torque_delay: Delay = None
@@ -66,9 +73,8 @@ class Resample(Command, action="logs:resample"):
     """Replace an existing file."""
 
 
-@command("export")
 @dataclass(frozen=True)
-class Export(Command, action="logs:export"):
+class Export(Command, called="export", action="logs:export"):
     """Write the logs of a results folder as CSV."""
 
     folder: Log
@@ -79,16 +85,15 @@ class Export(Command, action="logs:export"):
     """Replace existing files."""
 
 
-@command("device")
 @dataclass(frozen=True)
-class ShowDevice(Command, action="device:device"):
+class ShowDevice(Command, called="device", action="device:device"):
     """Print a servo that was identified from public logs, with standard errors, or list them; write it for MuJoCo."""
 
     name: Annotated[str, Word("NAME", positional=True)] = ""
     """Of the device. Default: list all."""
     robot: Annotated[str | None, Word("ROBOT")] = None
     """Robot that it drives: name, or file (MJCF or URDF). Default: a pendulum."""
-    joints: Annotated[tuple[str, ...], Word("JOINT")] = ()
+    joints: Joints = ()
     """Joints that it drives. Default: all."""
     kp: float = 16.0
     """Gain of the firmware."""
@@ -102,9 +107,8 @@ class ShowDevice(Command, action="device:device"):
     """Print as JSON, with the covariance; human-readable text goes to the error stream."""
 
 
-@command("robot")
 @dataclass(frozen=True)
-class DescribeRobot(Command, action="robot:describe"):
+class DescribeRobot(Command, called="robot", action="robot:describe"):
     """Show what is identifiable: joints, base parameters, and a torque budget."""
 
     name: ThisRobot
@@ -112,14 +116,11 @@ class DescribeRobot(Command, action="robot:describe"):
     json: Json = False
     """Print joints and parameters as JSON; human-readable text goes to the error stream."""
     parameters: Parameters = Parameters()  # noqa: RUF009  # frozen
-    """Which parameters are identified."""
     mounting: MountingOptions = MountingOptions()  # noqa: RUF009  # frozen
-    """How the robot is mounted."""
 
 
-@command("scenario")
 @dataclass(frozen=True)
-class WriteScenario(Command, action="scenario:write"):
+class WriteScenario(Command, called="scenario", action="list:write_scenario"):
     """Write a scenario to a file, with every setting explained. Without a name: list the shipped scenarios."""
 
     name: ThisScenario = None
@@ -130,9 +131,8 @@ class WriteScenario(Command, action="scenario:write"):
     """Replace an existing file."""
 
 
-@command("new")
 @dataclass(frozen=True)
-class New(Command, action="authors:begin"):
+class New(Command, called="new", action="authors:begin"):
     """Create a scenario, a study, a plug-in package (templates that run), or an example arm with logs."""
 
     what: Annotated[Literal["scenario", "study", "plugin", "example"], Word(positional=True)]
@@ -150,9 +150,8 @@ class New(Command, action="authors:begin"):
     """File or folder to write. Default: NAME.toml, or NAME."""
 
 
-@command("check")
 @dataclass(frozen=True)
-class Check(Command, action="authors:check"):
+class Check(Command, called="check", action="authors:check"):
     """Check whether a plug-in satisfies the contract of its kind."""
 
     plugin: Annotated[str, Word(positional=True)]
@@ -161,9 +160,8 @@ class Check(Command, action="authors:check"):
     """Print the checks and their results as JSON; human-readable text goes to the error stream."""
 
 
-@command("completion")
 @dataclass(frozen=True)
-class Completion(Command, action="completion:complete"):
+class Completion(Command, called="completion", action="completion:complete"):
     """Print a script for a shell, which then completes commands and options with the tab key.
 
     bash: idbench completion bash > ~/.local/share/bash-completion/completions/idbench
@@ -179,9 +177,8 @@ class Completion(Command, action="completion:complete"):
     """The shell."""
 
 
-@command("list")
 @dataclass(frozen=True)
-class List(Command, action="list:list_plugins"):
+class List(Command, called="list", action="list:list_plugins"):
     """List all parts that can be combined, built-in and plug-ins."""
 
     json: Json = False
