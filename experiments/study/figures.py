@@ -9,7 +9,7 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
 from idbench.experiments.reports.drawn import svg
-from idbench.experiments.study.answer import in_words, value
+from idbench.experiments.study.answer import in_words
 from idbench.experiments.study.axis import Axis
 from idbench.experiments.study.statistics import RIGHT, Cell
 from idbench.experiments.text import FORMS, SIGMAS
@@ -108,7 +108,7 @@ def matrix_figure(rows: Sequence[str], parameters: Sequence[str], values: Array,
 
 
 def _rows_of(cells: Sequence[Cell], axis: Axis) -> list[str]:
-    return [f"{value(cell.settings[axis.field])} {cell.names[2]}" if cell.settings else cell.names[2] for cell in cells]
+    return [f"{in_words(cell.settings[axis.field])} {cell.names[2]}" if cell.settings else cell.names[2] for cell in cells]
 
 
 def bars_figure(cells: Sequence[Cell]) -> str:
@@ -203,7 +203,7 @@ def _places(panel: Panel, group: Sequence[Cell], axis: Axis, edges: int = 4, tic
     values = [cell.settings[axis.field] for cell in group]
     if not axis.numeric:
         words = [axis.label(v) for v in axis.points]
-        panel.set_xticks(range(len(words)), [value(word) for word in words], rotation=20)
+        panel.set_xticks(range(len(words)), [in_words(word) for word in words], rotation=20)
         return np.array([words.index(v) for v in values], dtype=np.float64)
     numbers = np.array(axis.points, dtype=np.float64)
     positive = numbers[numbers > 0]
@@ -213,7 +213,7 @@ def _places(panel: Panel, group: Sequence[Cell], axis: Axis, edges: int = 4, tic
         else:
             panel.set_xscale("symlog", linthresh=float(positive.min()))
     some = numbers[:: 1 + len(numbers) // ticks]
-    written = [in_words(axis.field, x, edges).replace(" (", "\n(") for x in some.tolist()]
+    written = [in_words(x, axis.field, edges).replace(" (", "\n(") for x in some.tolist()]
     panel.set_xticks(some.tolist(), labels=written, fontsize=7)
     panel.set_xticks([], minor=True)
     return np.array(values, dtype=np.float64)

@@ -78,14 +78,7 @@ class Shard:
 def run_shard(study: Study, runs: range, *, progress: Progress | None = None) -> Shard:
     """Simulate and identify runs of one combination of the grid; a run that fails leaves its reason in its rows.
 
-    Parameters
-    ----------
-    study : Study
-        What to run.
-    runs : range
-        Numbers of the runs, all of one point of the grid.
-    progress : callable, optional
-        Receives the share that is done: the simulation and each method count alike.
+    `progress` receives the share that is done: the simulation and each method count alike.
     """
     shard = Shard()
     scenarios = {run: study.scenario_of(run) for run in runs}
