@@ -80,15 +80,7 @@ def imperfections(table2: Scenario) -> list[Imperfection]:
 
 
 class Attribution:
-    """Errors of all imperfections; their logs are simulated on threads, while the twin is. No bit depends on the threads.
-
-    Parameters
-    ----------
-    table2 : Scenario
-        The robot and its motion.
-    threads : int
-        Simulations at a time.
-    """
+    """Errors of all imperfections; their logs are simulated on threads, while the twin is. No bit depends on the threads."""
 
     def __init__(self, table2: Scenario, threads: int = 2) -> None:
         self._imperfections = imperfections(table2)

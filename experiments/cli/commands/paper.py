@@ -13,8 +13,7 @@ from idbench.experiments.cli.options.jobs import SearchCommand, Table1Command, T
 from idbench.experiments.cli.saving import saved
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.paper.job import Searching, searched, table1_of, table2_of
-from idbench.experiments.paper.motions import Table1Motions
-from idbench.experiments.paper.motions_report import picture, print_motions
+from idbench.experiments.paper.motions import Table1Motions, picture, print_motions
 from idbench.experiments.paper.table1 import print_table1
 from idbench.experiments.paper.table2 import print_table2
 from idbench.experiments.results.folder import ResultsFolder
