@@ -47,10 +47,7 @@ CONTRACTS: Mapping[str, tuple[Clause, ...]] = {
 def found(name: str) -> tuple[Table[Any], Any]:
     """Return the table and the plug-in of a name, such as TLS, drives/averaged or mybench:TotalLeastSquares.
 
-    Raises
-    ------
-    ExperimentError
-        If there is none, several have the name, or it cannot be loaded.
+    ExperimentError if there is none, several have the name, or it cannot be loaded.
     """
     if ":" in name:
         return _loaded(name)
@@ -78,12 +75,6 @@ def _loaded(name: str) -> tuple[Table[Any], Any]:
     if not there:
         raise ExperimentError(f"{name} makes {type(made).__name__}, which is a plug-in of no point")
     return there[0], made
-
-
-def kept(name: str, example: Example) -> Iterator[tuple[str, str]]:
-    """Yield what the plug-in of a name is asked, and why it does not keep it; empty if it does."""
-    table, plugin = found(name)
-    yield from keeps(table, plugin, example)
 
 
 def keeps(table: Table[Any], plugin: Any, example: Example) -> Iterator[tuple[str, str]]:

@@ -96,10 +96,7 @@ class LoadFit:
 def payload_of(asked: PayloadRequest) -> LoadFit:
     """The payload in the gripper.
 
-    Raises
-    ------
-    ExperimentError, IdentificationError, BenchError
-        If something is wrong with the request or its logs, or no way gives a payload.
+    ExperimentError, IdentificationError or BenchError if something is wrong with the request or its logs, or no way gives one.
     """
     if asked.before is not None and asked.unloaded:
         raise ExperimentError("--before and --unloaded both say what the robot is: give one")
@@ -133,12 +130,9 @@ def _payload(judgement: LoadJudgement, notes: Sequence[str], found: Mapping[str,
 
 
 def gains_of(asked: GainsRequest) -> LoadFit:
-    """Return the torque constants of the drives.
+    """Torque constants of the drives.
 
-    Raises
-    ------
-    ExperimentError, IdentificationError, BenchError
-        If something is wrong with the request or its logs.
+    ExperimentError, IdentificationError or BenchError if something is wrong with the request or its logs.
     """
     if asked.known.mass is None:
         raise ExperimentError("--mass is missing: the gains follow from a payload whose mass is known")

@@ -30,10 +30,7 @@ ROUNDING = 1e-9  # Share of the moments of inertia that is rounding of a drawing
 def payload_parameters(mass: float | None, at: Sequence[float] | None, inertia: Sequence[float] | None) -> dict[str, float]:
     """Return the parameters of a payload that follow from its mass, centre of mass and inertia about that.
 
-    Raises
-    ------
-    ExperimentError
-        If a value is not finite, the mass is not above 0, or something is given without what it needs.
+    ExperimentError if a value is not finite, the mass is not above 0, or something is given without what it needs.
     """
     for name, needs, given in (("--at", "--mass", at), ("--inertia", "--at", inertia)):
         if given is not None and (mass is None or (name == "--inertia" and at is None)):
@@ -59,9 +56,8 @@ def payload_parameters(mass: float | None, at: Sequence[float] | None, inertia: 
     if mass is not None and at is not None:
         found |= {f"M{x}L": mass * c for x, c in zip("XYZ", at, strict=True)}
         if inertia is not None:
-            xx, yy, zz, xy, xz, yz = inertia
             c = np.array(at)
-            about = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) + mass * (c @ c * np.eye(3) - np.outer(c, c))
+            about = about + mass * (c @ c * np.eye(3) - np.outer(c, c))
             found |= dict(zip(LETTERS[:6], map(float, about[np.triu_indices(3)]), strict=True))
     return found
 

@@ -18,15 +18,13 @@ from idbench.identify.loads.drive_gains import identify_drive_gains
 from idbench.identify.loads.loaded_robot import LETTERS, LoadedRobot
 from idbench.identify.loads.payload import WAYS, PayloadEstimate
 from idbench.sim.engine.run import Run
-from idbench.sim.engine.simulation import simulate
+from idbench.sim.engine.simulation import Progress, simulate
 from idbench.sim.robot.payload import Payload
 from idbench.sim.robot.tree import standard_parameters
 from idbench.sim.scenario.scenario import Scenario
 
 GAINS = (0.7, 1.4)  # True gains are drawn between these multiples of those that logs are read with
 MOST_RUNS = 1000  # Runs that are simulated at once
-
-Told = Callable[[float], None]
 
 Found: TypeAlias = tuple[tuple[str, ...], Array, Array, Array]
 """Names, estimate, sigma and truth."""
@@ -110,7 +108,7 @@ class Pairs:
         first, second = ((log,) for log in logs)
         return LoadedRobot(self.robot_model.tree, self.robot_model.grouping.standard, first, second, known=known)
 
-    def payloads(self, told: Told) -> dict[str, PairScore]:
+    def payloads(self, told: Progress) -> dict[str, PairScore]:
         """Accuracy of each way for the payload."""
         found, ways = dict[str, PairScore](), list(WAYS)
         for way, identify in WAYS.items():
@@ -118,7 +116,7 @@ class Pairs:
             found[way] = self._scored(one, partial(_part, told, ways.index(way), len(ways)))
         return found
 
-    def gains(self, known: Mapping[str, float], told: Told) -> PairScore:
+    def gains(self, known: Mapping[str, float], told: Progress) -> PairScore:
         """Accuracy of gains that are drawn for each run, given the known payload."""
         rng, n = np.random.default_rng(self.scenario.seed), self.robot_model.tree.n
         true = rng.uniform(*GAINS, (self.runs, n))
@@ -137,7 +135,7 @@ class Pairs:
         base = robot.both.K[own, p:] @ np.array([self.truth[x] for x in LETTERS])
         return found.names, found.X, found.sigma, base
 
-    def _scored(self, one: Callable[[int], Found], told: Told) -> PairScore:
+    def _scored(self, one: Callable[[int], Found], told: Progress) -> PairScore:
         names: tuple[str, ...] = ()
         start = perf_counter()
         rows = list[tuple[Array, Array, Array]]()
@@ -156,5 +154,5 @@ class Pairs:
         return PairScore(names, each[0], each[1], each[2], (perf_counter() - start) / self.runs, tuple(failures))
 
 
-def _part(told: Told, number: int, count: int, share: float) -> None:
+def _part(told: Progress, number: int, count: int, share: float) -> None:
     told((number + share) / count)

@@ -25,18 +25,7 @@ MOVES, VELOCITY = 5, 2.0  # Moves of a log for each joint, and their largest spe
 
 
 def example_files(name: str) -> dict[str, str]:
-    """Return the files of an example, by their names.
-
-    Parameters
-    ----------
-    name : str
-        Name of a shipped robot.
-
-    Returns
-    -------
-    dict
-        The arm in MJCF, logs of two motions in closed loop, and a table of the true base parameters.
-    """
+    """Files of an example by their names: a shipped arm in MJCF, logs of two motions in closed loop, true base parameters."""
     robot, plain = Robot.load(name), load_scenario("arm")
     contents = {"arm.xml": Robot.path(name).read_text(encoding="utf-8")}
     for file, seed in LOGS.items():
