@@ -12,7 +12,6 @@ from idbench.identify.basis.tape import Step, Symbol, Tape, Value
 
 LONG = 100  # Characters of an expression that is not written into another one: a line stays readable
 
-
 C_WORDS = (
     "auto break case char const continue default do double else enum extern float for goto if inline int long register "
     "restrict return short signed sizeof static struct switch typedef union unsigned void volatile while"
@@ -21,7 +20,6 @@ C_WORDS = (
 
 RESERVED = frozenset({*keyword.kwlist, *C_WORDS.split(), "half_width", "fitted_speed", "fitted_torque", "temperature"})
 """What no parameter can be called in the code."""
-
 
 OPERATIONS = {
     "+": "({} + {})",

@@ -81,7 +81,8 @@ class LoadFit:
 
     def summary(self) -> dict[str, Any]:
         """The summary.json of the command, but for the names of files."""
-        return {**self.content, "judgement": self.judgement.summary(self.document.verdicts[0][0])}
+        logs = {name: verdict.summary() for name, verdict in self.judgement.verdicts.items()}
+        return {**self.content, "judgement": {"verdict": self.document.verdicts[0][0], "logs": logs}}
 
     def show(self, console: Console) -> None:
         """Print what was found."""

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 
@@ -127,10 +127,6 @@ class LoadJudgement:
         """Warnings by subject."""
         of_payload_ = [*self._of_stated(), *(_of_body(payload, self.names[len(self.robot.without) :]) if payload else ())]
         return {LOG: list(self._of_logs()), PAYLOAD: of_payload_, MODEL: list(self._of_fit())}
-
-    def summary(self, word: str) -> dict[str, Any]:
-        """Its part of summary.json."""
-        return {"verdict": word, "logs": {name: verdict.summary() for name, verdict in self.verdicts.items()}}
 
     def _of_logs(self) -> Iterator[str]:
         """Yield what is suspicious about each log by itself, by the robot alone: its last link includes the payload."""

@@ -147,11 +147,8 @@ class Pairs:
             except IdentificationError as failed:
                 failures.append(str(failed))
             told((run + 1) / self.runs)
-        if not rows:
-            empty = np.empty((0, 0))
-            return PairScore((), empty, empty, empty, 0.0, tuple(failures))
-        each = [np.array(x) for x in zip(*rows, strict=True)]
-        return PairScore(names, each[0], each[1], each[2], (perf_counter() - start) / self.runs, tuple(failures))
+        truths, errors, z = (np.array([row[part] for row in rows]) for part in range(3))
+        return PairScore(names, truths, errors, z, (perf_counter() - start) / self.runs, tuple(failures))
 
 
 def _part(told: Progress, number: int, count: int, share: float) -> None:

@@ -1,4 +1,4 @@
-"""The jobs `table1` and `table2`: a request becomes the paper's comparison, or its experiment."""
+"""The job `table1`: a request becomes the paper's comparison, on its motion or one that is searched."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -8,12 +8,10 @@ import numpy as np
 
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.paper.table1 import CHAINS_COMPARED, PAPER, SCENARIO, Table1
-from idbench.experiments.paper.table2 import Table2
-from idbench.experiments.requests.jobs import Table1Request, Table2Request
+from idbench.experiments.requests.jobs import Table1Request
 from idbench.identify import CHAINS, MODELS, ExplicitModel, MotionLog, Problem, TorqueChannel, scara
 from idbench.identify.rows.row_map import Kernel
 from idbench.sim.engine.run import ideal_log
-from idbench.sim.engine.watch import Watch
 from idbench.sim.robot.motors import Array
 from idbench.sim.robot.robot import Robot
 from idbench.sim.scenario.scenario import Scenario
@@ -23,7 +21,6 @@ from idbench.sim.trajectories.quintic import draw_waypoint
 
 PAPER_CONDITION = {MODELS.create(name): PAPER[name].condition_number for name in ("explicit", "power")}
 """Cond(W) of the paper's Table 1; that of the implicit model is the explicit one's."""
-
 
 FS = 100.0  # Sampling frequency [Hz]
 REST = 3.0  # Time at rest at both ends [s]
@@ -151,11 +148,6 @@ def table1_of(asked: Table1Request, searching: Searching | None = None) -> Table
     chains = CHAINS_COMPARED if asked.chain == "all" else (asked.chain,)
     scenario = load(asked.scenario or SCENARIO) if asked.seed is None else searched(asked.seed, searching)
     return Table1(scenario, chains)
-
-
-def table2_of(asked: Table2Request, progress: Callable[[float], None], watch: Watch | None = None) -> Table2:
-    """Return the paper's experiment on the virtual robot, to be closed by the caller."""
-    return Table2(load(asked.scenario), progress, watch)
 
 
 def searched(seed: int, searching: Searching | None = None) -> Scenario:

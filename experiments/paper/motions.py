@@ -190,20 +190,15 @@ def _said(found: Table1Motions, chain: str) -> str:
     errors = found.errors[chain]
     inside = sum(int(np.count_nonzero(errors.explained(model))) for model in PAPER)
     cells = len(PAPER) * len(found.truth)
-    friction = _times(found, chain, "F")
+    which = [i for i, name in enumerate(found.truth) if name.startswith("F")]
+    times = errors.percentiles("explicit", 50)[which] / np.array(PAPER["explicit"].error)[which]
+    friction = float(np.exp(np.mean(np.log(times))))
     few = f"; so few motions make no band, draw more than {found.motions}" if errors.kept < FEW else ""
     return (
         f"{NAMES[chain]} (chain {chain}): {errors.kept} of {errors.drawn} motions have the paper's Cond(W) within "
         f"{found.tolerance:.0%}; {inside} of {cells} of the paper's errors lie inside the band; the friction errors of the "
         f"explicit model are {friction:.2g} times the paper's (geometric mean of the medians){few}"
     )
-
-
-def _times(found: Table1Motions, chain: str, letters: str) -> float:
-    """Return the median errors of some of the explicit model's parameters over the paper's, as a geometric mean."""
-    which = [i for i, name in enumerate(found.truth) if name.startswith(letters)]
-    median = found.errors[chain].percentiles("explicit", 50)[which]
-    return float(np.exp(np.mean(np.log(median / np.array(PAPER["explicit"].error)[which]))))
 
 
 def picture(found: Table1Motions) -> bytes:

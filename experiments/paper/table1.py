@@ -168,7 +168,6 @@ class Table1:
 
 OVER = {"energy": "power", "integral": "implicit"}  # Models that are others, integrated
 
-
 FINER: dict[str, Any] = {"differentiator": CentralDifference(6)}
 UNFILTERED: dict[str, Any] = {"prefilter": NoPrefilter()}
 MASKED: dict[str, Any] = {"mask": paper_masked_chain().mask}

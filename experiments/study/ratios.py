@@ -18,7 +18,6 @@ DRAWS = 2000  # Of a bootstrap: the ends of an interval are then known to some 3
 PAIRS = (("implicit", "explicit"), ("power", "explicit"), ("energy", "power"), ("integral", "implicit"))
 """Models that the paper compares: the one whose errors are divided, and by whose."""
 
-
 NOISES = {
     "ripple": "with ripple, the paper's experiment",
     "torque": "with white torque noise",
