@@ -1,7 +1,5 @@
 """An example to work on: the file of an arm, two logs that it recorded, and its true parameters."""
 
-import csv
-import io
 import tempfile
 from collections.abc import Mapping
 from dataclasses import replace
@@ -46,9 +44,5 @@ def _table(robot: Robot, standard: Mapping[str, float]) -> str:
     """Return the true base parameters as CSV."""
     tree = kinematic_tree(robot)
     base = BaseParameters.of(tree, tree_basis(tree))
-    text = io.StringIO()
     rows = zip(base.values(standard).items(), base.basis.units, strict=True)
-    csv.writer(text, lineterminator="\n").writerows(
-        [("parameter", "value", "unit"), *((k, f"{x:.6g}", u) for (k, x), u in rows)]
-    )
-    return text.getvalue()
+    return "".join(["parameter,value,unit\n", *(f"{name},{x:.6g},{unit}\n" for (name, x), unit in rows)])
