@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from idbench.experiments.exports.functions import Function, RobotFunctions
-from idbench.identify.basis.tape import Step, Symbol, Tape, Value
+from idbench.identify.basis.tape import Step, Symbol, Tape
 
 LONG = 100  # Characters of an expression that is not written into another one: a line stays readable
 
@@ -74,11 +74,8 @@ def body(language: Language, tape: Tape, function: Function) -> tuple[list[str],
             lines.append(language.assigned.format(name, _bare(made)))
             made = name
         text[number] = made
-    return lines, [_of(language, text, x) for x in function.values], called
-
-
-def _of(language: Language, text: Mapping[int, str], x: Value) -> str:
-    return _bare(text[x.number]) if isinstance(x, Symbol) else language.number(x)
+    results = [_bare(text[x.number]) if isinstance(x, Symbol) else language.number(x) for x in function.values]
+    return lines, results, called
 
 
 def _bare(text: str) -> str:

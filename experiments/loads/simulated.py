@@ -110,10 +110,9 @@ class Pairs:
 
     def payloads(self, told: Progress) -> dict[str, PairScore]:
         """Accuracy of each way for the payload."""
-        found, ways = dict[str, PairScore](), list(WAYS)
-        for way, identify in WAYS.items():
-            one = partial(self._payload, identify)
-            found[way] = self._scored(one, partial(_part, told, ways.index(way), len(ways)))
+        found = dict[str, PairScore]()
+        for number, (way, identify) in enumerate(WAYS.items()):
+            found[way] = self._scored(partial(self._payload, identify), told, number, len(WAYS))
         return found
 
     def gains(self, known: Mapping[str, float], told: Progress) -> PairScore:
@@ -135,7 +134,7 @@ class Pairs:
         base = robot.both.K[own, p:] @ np.array([self.truth[x] for x in LETTERS])
         return found.names, found.X, found.sigma, base
 
-    def _scored(self, one: Callable[[int], Found], told: Progress) -> PairScore:
+    def _scored(self, one: Callable[[int], Found], told: Progress, number: int = 0, count: int = 1) -> PairScore:
         names: tuple[str, ...] = ()
         start = perf_counter()
         rows = list[tuple[Array, Array, Array]]()
@@ -146,10 +145,6 @@ class Pairs:
                 rows.append((truth, X - truth, (X - truth) / sigma))
             except IdentificationError as failed:
                 failures.append(str(failed))
-            told((run + 1) / self.runs)
+            told((number + (run + 1) / self.runs) / count)
         truths, errors, z = (np.array([row[part] for row in rows]) for part in range(3))
         return PairScore(names, truths, errors, z, (perf_counter() - start) / self.runs, tuple(failures))
-
-
-def _part(told: Progress, number: int, count: int, share: float) -> None:
-    told((number + share) / count)

@@ -261,7 +261,8 @@ def _model_table(table: Table1, form: str) -> Table:
     truth = list(table.truth.values())
     for i, (name, true) in enumerate(table.truth.items()):
         printed = (f"{paper.estimate[i]:.3f}", f"{paper.error[i]:.3f}") if paper else ()
-        grid.add_row(name, f"{true:g}", *printed, *(cell for e in estimates for cell in _cells(e, truth, i)))
+        found = [(f"{e.X[i]:.5f}", f"{e.relative_error_percent(truth)[i]:.2g}") for e in estimates]
+        grid.add_row(name, f"{true:g}", *printed, *(cell for cells in found for cell in cells))
     grid.add_section()
     printed = (f"{paper.condition_number:g}", "") if paper else ()
     grid.add_row("Cond(W)", "", *printed, *(cell for e in estimates for cell in (f"{e.condition_number:.1f}", "")))
@@ -289,10 +290,6 @@ def _causes_table(table: Table1) -> Table:
     for name, worst in causes(table):
         grid.add_row(name, *(f"{error:.1g}" for w in worst.values() for error in (w.inertia, w.friction)))
     return grid
-
-
-def _cells(estimate: Estimate, truth: list[float], i: int) -> tuple[str, str]:
-    return f"{estimate.X[i]:.5f}", f"{estimate.relative_error_percent(truth)[i]:.2g}"
 
 
 def table1_markdown(table: Table1) -> str:
