@@ -50,10 +50,7 @@ QUIET = {
 def cluster_pool(study: Study, scheduler: str | None, workers: int) -> Iterator["ClusterPool"]:
     """Give the workers of the scheduler at an address, or else of as many new processes of this machine.
 
-    Raises
-    ------
-    StudyError
-        If Dask is not installed, the scheduler cannot be reached, or the workers are lost.
+    StudyError if Dask is not installed, the scheduler cannot be reached, or the workers are lost.
     """
     try:
         import dask

@@ -2,7 +2,6 @@
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from math import isfinite
 from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING, Any
@@ -17,7 +16,7 @@ from idbench.experiments.program import program
 from idbench.experiments.reports.figures import rendered
 from idbench.experiments.results.attempts import Attempts
 from idbench.experiments.results.folder import ResultsFolder
-from idbench.experiments.results.writing import write_summary
+from idbench.experiments.results.writing import finite, write_summary
 from idbench.experiments.study.answer import (
     grouped,
     headline,
@@ -260,5 +259,5 @@ def _cell(cell: Cell) -> dict[str, Any]:
             "paper_coverage": cell.coverage(cell.paper_sigma),
             **{f"{bound[1:]}_percent": 100 * cell.least(bound) for bound in BOUNDS},
         }
-        summary |= {name: [float(x) if isfinite(x) else None for x in values] for name, values in numbers.items()}
+        summary |= {name: [finite(x) for x in values] for name, values in numbers.items()}
     return summary
