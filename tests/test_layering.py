@@ -52,7 +52,7 @@ ALLOWED_IN = {
     "experiments/study/comparison.py": {"scipy"},
     "experiments/reports/log_picture.py": {"matplotlib", "scipy"},
     "experiments/study/figures.py": {"matplotlib"},
-    "experiments/paper/motions_report.py": {"matplotlib"},
+    "experiments/paper/motions.py": {"matplotlib"},
     "experiments/study/study_results.py": {"tomli_w"},
     "experiments/reports/excite.py": {"matplotlib"},
     "experiments/reports/drawn.py": {"matplotlib"},

@@ -16,7 +16,7 @@ from idbench.experiments.errors import ExperimentError, StudyError
 from idbench.experiments.excite.excited import Excited
 from idbench.experiments.excite.job import excited
 from idbench.experiments.loads.job import LoadFit, gains_of, payload_of
-from idbench.experiments.paper.job import table1_of, table2_of
+from idbench.experiments.paper.job import table1_of
 from idbench.experiments.paper.table1 import Table1
 from idbench.experiments.paper.table2 import Table2
 from idbench.experiments.requests import jobs
@@ -31,6 +31,7 @@ from idbench.experiments.study.study_file import load_study
 from idbench.experiments.study.study_results import print_study, summary_of
 from idbench.experiments.text import printed
 from idbench.identify import BLOCKS
+from idbench.sim.scenario.scenario_file import load
 
 WIDTH = 160  # Characters of a line
 
@@ -158,7 +159,7 @@ def table1(**keys: Any) -> Table1:
 
 def table2(**keys: Any) -> Table2:
     """Return the paper's experiment on the virtual robot (Table 2); option: scenario."""
-    return table2_of(_asked(jobs.Table2Request, "table2", keys), _unheard)
+    return Table2(load(_asked(jobs.Table2Request, "table2", keys).scenario), _unheard)
 
 
 def _unheard(*_: object) -> None:

@@ -47,10 +47,7 @@ CONTRACTS: Mapping[str, tuple[Clause, ...]] = {
 def found(name: str) -> tuple[Table[Any], Any]:
     """Return the table and the plug-in of a name, such as TLS, drives/averaged or mybench:TotalLeastSquares.
 
-    Raises
-    ------
-    ExperimentError
-        If there is none, several have the name, or it cannot be loaded.
+    ExperimentError if there is none, several have the name, or it cannot be loaded.
     """
     if ":" in name:
         return _loaded(name)

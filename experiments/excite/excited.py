@@ -114,8 +114,8 @@ class Excited:
             sys.stderr.write("\nidbench: stopping: the best motion so far is judged and written; Ctrl-C again drops it\n")
         found = cls(design, search.best, random, drawn, search.interrupted)
         names = ("on the way from home", "on the way back")
-        ways = [f"{name}, {what}" for name, use in zip(names, found.way_uses, strict=True) for what in use.broken()]
-        if broken := [*found.use.broken(), *ways]:
+        ways = zip(names, map(design.use_of, found.ways), strict=True)
+        if broken := [*found.use.broken(), *(f"{name}, {what}" for name, use in ways for what in use.broken())]:
             more = f", and {len(broken) - 1} more" if len(broken) > 1 else ""
             raise ExperimentError(
                 f"no motion was found that keeps all limits: {broken[0]}{more}; widen that limit, narrow the [position] of "
@@ -143,12 +143,6 @@ class Excited:
     def ways(self) -> tuple[Reference, Reference]:
         """The ways from home to its start, and back, at 1 kHz."""
         return self.design.ways(self.c, FS, self.pace)
-
-    @cached_property
-    def way_uses(self) -> tuple[LimitUse, LimitUse]:
-        """How far the ways use the limits."""
-        there, back = (self.design.use_of(way) for way in self.ways)
-        return there, back
 
     @cached_property
     def information(self) -> Array:

@@ -4,6 +4,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.excite.design import Design
 from idbench.experiments.excite.excited import Excited
@@ -13,7 +15,7 @@ from idbench.experiments.identification.reading import file_of, read
 from idbench.experiments.identification.robot_model import RobotModel, absolute
 from idbench.experiments.requests.jobs import ExciteRequest
 from idbench.experiments.requests.shared import LogRequest
-from idbench.identify import MotionLog, TorqueChannel
+from idbench.identify import TorqueChannel
 from idbench.sim.encoders import IncrementalEncoder
 from idbench.sim.limits.motion_limits import MotionLimits, limits_of
 from idbench.sim.scenario.measurement import TorqueMeasurement
@@ -32,16 +34,13 @@ LOUD = 1e6  # The same above which it is [N m]
 def excited(asked: ExciteRequest, progress: Callable[[float], None]) -> tuple[Excited, MotionSequence | None]:
     """Return the motion that is designed, the last of a sequence where one is asked for, and that sequence.
 
-    Raises
-    ------
-    ExperimentError, IdentificationError, BenchError
-        If something is wrong with the request, or no motion keeps the limits.
+    ExperimentError, IdentificationError or BenchError if something is wrong with the request, or no motion keeps the limits.
     """
     design, share = designed(asked), _percent(asked.until)
     if not share:
         return Excited.of(design, progress), None
     sequence = MotionSequence.of(design, share, progress)
-    return sequence.last, sequence
+    return sequence.rounds[-1].excited, sequence
 
 
 def designed(asked: ExciteRequest) -> Design:
@@ -79,7 +78,8 @@ def designed(asked: ExciteRequest) -> Design:
         seed=asked.seed,
         weights=_weights(asked.weigh),
         criterion=asked.criterion,
-        logs=tuple(_log(path, robot_model) for path in asked.log),
+        # Of the torques of earlier logs nothing counts, so that their meaning is not asked for.
+        logs=tuple(read(file_of(path), LogRequest(), robot_model, TorqueChannel("held")).longest for path in asked.log),
         parameters=asked.parameters,
     )
 
@@ -143,6 +143,15 @@ def _percent(text: str | None) -> float | None:
     return share
 
 
-def _log(path: Path, robot_model: RobotModel) -> MotionLog:
-    """Return an earlier log: of its torques nothing counts, so that their meaning is not asked for."""
-    return read(file_of(path), LogRequest(), robot_model, TorqueChannel("held")).longest
+PARTS = "part: 0 the way from home to the start, 1 the motion, with its rest at both ends, 2 the way back"
+"""What stands in the first line of the file of a motion."""
+
+
+def write_motion(found: Excited, path: Path) -> None:
+    """Write time [s], part, positions [rad], velocities and accelerations of joints as CSV, at the controller's frequency."""
+    fs, joints = found.design.scenario.fs, found.design.robot_model.robot.joints
+    part, motion = found.planned(fs)
+    names = ["t", "part", *(f"{letters}_{joint}" for letters in ("q", "qd", "qdd") for joint in joints)]
+    table = np.column_stack([np.arange(len(part)) / fs, part, motion.q, motion.qd, motion.qdd])
+    formats = ["%.6f", "%d", *["%.9g"] * (3 * len(joints))]
+    np.savetxt(path, table, delimiter=",", header=f"# {PARTS}\n{','.join(names)}", comments="", fmt=formats)

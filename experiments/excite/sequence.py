@@ -55,7 +55,7 @@ class MotionSequence:
         After ROUNDS motions, or Ctrl-C, it ends with what there is.
         """
         rounds = list[Round]()
-        logs = design.logs
+        logs, model = design.logs, design.robot_model
         weights = design.weights
         try:
             for number in range(ROUNDS):
@@ -63,7 +63,9 @@ class MotionSequence:
                 excited = Excited.of(asked, progress)
                 run = simulate(replace(excited.scenario, seed=design.scenario.seed + number))
                 logs = (*logs, run.alone())
-                rounds.append(_judged(excited, logs))
+                estimate = identify(logs, model.basis, ExplicitModel())
+                shares = brisk_shares(model.tree, model.basis, estimate.X, estimate.standard_errors)
+                rounds.append(Round(excited, logs[-1], estimate, shares))
                 if rounds[-1].share < wished or excited.interrupted:
                     break
                 weights = _weak(rounds[-1], wished, design.weights)
@@ -78,11 +80,6 @@ class MotionSequence:
         """Whether every parameter is known well enough."""
         return self.rounds[-1].share < self.wished
 
-    @property
-    def last(self) -> Excited:
-        """The last motion."""
-        return self.rounds[-1].excited
-
     def summary(self) -> dict[str, Any]:
         """Its part of summary.json."""
         return {"until": self.wished, "reached": self.reached, "rounds": [_summary(each) for each in self.rounds]}
@@ -91,13 +88,6 @@ class MotionSequence:
 def _summary(found: Round) -> dict[str, Any]:
     X, sigma = found.estimate.X.tolist(), found.estimate.standard_errors.tolist()
     return {"brisk_share": found.share, "weakest": found.weakest, "estimate": X, "sigma": sigma}
-
-
-def _judged(excited: Excited, logs: tuple[MotionLog, ...]) -> Round:
-    robot_model = excited.design.robot_model
-    estimate = identify(logs, robot_model.basis, ExplicitModel())
-    shares = brisk_shares(robot_model.tree, robot_model.basis, estimate.X, estimate.standard_errors)
-    return Round(excited, logs[-1], estimate, shares)
 
 
 def _weak(last: Round, wished: float, weights: Mapping[str, float]) -> dict[str, float]:

@@ -8,10 +8,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from idbench.experiments.exports.functions import Function, RobotFunctions
-from idbench.identify.basis.tape import Step, Symbol, Tape, Value
+from idbench.identify.basis.tape import Step, Symbol, Tape
 
 LONG = 100  # Characters of an expression that is not written into another one: a line stays readable
-
 
 C_WORDS = (
     "auto break case char const continue default do double else enum extern float for goto if inline int long register "
@@ -21,7 +20,6 @@ C_WORDS = (
 
 RESERVED = frozenset({*keyword.kwlist, *C_WORDS.split(), "half_width", "fitted_speed", "fitted_torque", "temperature"})
 """What no parameter can be called in the code."""
-
 
 OPERATIONS = {
     "+": "({} + {})",
@@ -76,11 +74,8 @@ def body(language: Language, tape: Tape, function: Function) -> tuple[list[str],
             lines.append(language.assigned.format(name, _bare(made)))
             made = name
         text[number] = made
-    return lines, [_of(language, text, x) for x in function.values], called
-
-
-def _of(language: Language, text: Mapping[int, str], x: Value) -> str:
-    return _bare(text[x.number]) if isinstance(x, Symbol) else language.number(x)
+    results = [_bare(text[x.number]) if isinstance(x, Symbol) else language.number(x) for x in function.values]
+    return lines, results, called
 
 
 def _bare(text: str) -> str:

@@ -72,8 +72,10 @@ def urdf(fit: Fit, model: str, path: Path) -> Exported:
 
     written, robot_model = WrittenRobot(fit, model), fit.robot_model
     text = urdf_text(robot_model.name, robot_model.robot, robot_model.tree, written.values, robot_model.mounting)
-    lost = [*_unread(written, "most readers of a URDF"), *_springs(written), *_turned(written)]
-    return Exported({path: _marked(text, fit, model)}, [*written.warnings, *lost])
+    lost = _unread(written, "most readers of a URDF")
+    if springs := missing(written, ("K",)):
+        lost.append(f"a URDF has no springs, which are of the logs' torques: {springs}")
+    return Exported({path: _marked(text, fit, model)}, [*written.warnings, *lost, *_turned(written)])
 
 
 def sdf(fit: Fit, model: str, path: Path) -> Exported:
@@ -94,11 +96,6 @@ def _unread(written: WrittenRobot, reader: str) -> list[str]:
     if friction := missing(written, ("Fs",)):
         found.append(f"Drake has no Coulomb friction, which is of the logs' torques: {friction}")
     return found
-
-
-def _springs(written: WrittenRobot) -> list[str]:
-    share = missing(written, ("K",))
-    return [f"a URDF has no springs, which are of the logs' torques: {share}"] if share else []
 
 
 def _turned(written: WrittenRobot) -> list[str]:
@@ -218,11 +215,6 @@ def require_written_back(robot_model: RobotModel, path: Path) -> None:
     rewritten(robot_model.name, {}, path.absolute().parent, robot_model.mounting)
 
 
-def require_nothing(robot_model: RobotModel, path: Path) -> None:
-    """Accept all robots."""
-    del robot_model, path
-
-
 CODE = ("_mjlab.py", "_isaaclab.py", "_playground.py", "_band.svg")
 """Endings of the code beside ranges, and of the picture of free runs."""
 
@@ -231,7 +223,7 @@ EXPORTS: dict[str, FileKind] = {
     ".urdf": FileKind("the robot", urdf, require_written_back),
     ".sdf": FileKind("the robot", sdf, require_written_back),
     ".yaml": FileKind("values of the joints' actuators", actuators, require_written_back),
-    ".json": FileKind("base parameters and regressor", base_parameters, require_nothing),
+    ".json": FileKind("base parameters and regressor", base_parameters, lambda *_: None),
     ".py": FileKind("dynamics and regressors in Python", python_module, require_functions),
     ".c": FileKind("dynamics and regressors in C, with their header,", c_source, require_functions, (".h",)),
     ".toml": FileKind("ranges, with code for training,", training_ranges, require_written_back, CODE),

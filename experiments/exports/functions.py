@@ -193,10 +193,8 @@ class RobotFunctions:
     @cached_property
     def _linear(self) -> Basis:
         """The basis with blocks that are linear about the parameters."""
-        return replace(self.basis, held={}, blocks=tuple(self._about(block) for block in self.basis.blocks))
-
-    def _about(self, block: AbstractBlock) -> AbstractBlock:
-        return _AboutParameters(block, self) if block.is_nonlinear else block
+        blocks = (_AboutParameters(block, self) if block.is_nonlinear else block for block in self.basis.blocks)
+        return replace(self.basis, held={}, blocks=tuple(blocks))
 
     def slopes(self, block: AbstractBlock, state: State) -> dict[tuple[int, Parameter], Any]:
         """Return the columns of a block that is nonlinear: slopes at the parameters, as the identification takes them."""

@@ -81,7 +81,8 @@ class LoadFit:
 
     def summary(self) -> dict[str, Any]:
         """The summary.json of the command, but for the names of files."""
-        return {**self.content, "judgement": self.judgement.summary(self.document.verdicts[0][0])}
+        logs = {name: verdict.summary() for name, verdict in self.judgement.verdicts.items()}
+        return {**self.content, "judgement": {"verdict": self.document.verdicts[0][0], "logs": logs}}
 
     def show(self, console: Console) -> None:
         """Print what was found."""
@@ -96,10 +97,7 @@ class LoadFit:
 def payload_of(asked: PayloadRequest) -> LoadFit:
     """The payload in the gripper.
 
-    Raises
-    ------
-    ExperimentError, IdentificationError, BenchError
-        If something is wrong with the request or its logs, or no way gives a payload.
+    ExperimentError, IdentificationError or BenchError if something is wrong with the request or its logs, or no way gives one.
     """
     if asked.before is not None and asked.unloaded:
         raise ExperimentError("--before and --unloaded both say what the robot is: give one")
@@ -133,12 +131,9 @@ def _payload(judgement: LoadJudgement, notes: Sequence[str], found: Mapping[str,
 
 
 def gains_of(asked: GainsRequest) -> LoadFit:
-    """Return the torque constants of the drives.
+    """Torque constants of the drives.
 
-    Raises
-    ------
-    ExperimentError, IdentificationError, BenchError
-        If something is wrong with the request or its logs.
+    ExperimentError, IdentificationError or BenchError if something is wrong with the request or its logs.
     """
     if asked.known.mass is None:
         raise ExperimentError("--mass is missing: the gains follow from a payload whose mass is known")

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 
@@ -30,10 +30,7 @@ ROUNDING = 1e-9  # Share of the moments of inertia that is rounding of a drawing
 def payload_parameters(mass: float | None, at: Sequence[float] | None, inertia: Sequence[float] | None) -> dict[str, float]:
     """Return the parameters of a payload that follow from its mass, centre of mass and inertia about that.
 
-    Raises
-    ------
-    ExperimentError
-        If a value is not finite, the mass is not above 0, or something is given without what it needs.
+    ExperimentError if a value is not finite, the mass is not above 0, or something is given without what it needs.
     """
     for name, needs, given in (("--at", "--mass", at), ("--inertia", "--at", inertia)):
         if given is not None and (mass is None or (name == "--inertia" and at is None)):
@@ -59,9 +56,8 @@ def payload_parameters(mass: float | None, at: Sequence[float] | None, inertia: 
     if mass is not None and at is not None:
         found |= {f"M{x}L": mass * c for x, c in zip("XYZ", at, strict=True)}
         if inertia is not None:
-            xx, yy, zz, xy, xz, yz = inertia
             c = np.array(at)
-            about = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) + mass * (c @ c * np.eye(3) - np.outer(c, c))
+            about = about + mass * (c @ c * np.eye(3) - np.outer(c, c))
             found |= dict(zip(LETTERS[:6], map(float, about[np.triu_indices(3)]), strict=True))
     return found
 
@@ -131,10 +127,6 @@ class LoadJudgement:
         """Warnings by subject."""
         of_payload_ = [*self._of_stated(), *(_of_body(payload, self.names[len(self.robot.without) :]) if payload else ())]
         return {LOG: list(self._of_logs()), PAYLOAD: of_payload_, MODEL: list(self._of_fit())}
-
-    def summary(self, word: str) -> dict[str, Any]:
-        """Its part of summary.json."""
-        return {"verdict": word, "logs": {name: verdict.summary() for name, verdict in self.verdicts.items()}}
 
     def _of_logs(self) -> Iterator[str]:
         """Yield what is suspicious about each log by itself, by the robot alone: its last link includes the payload."""

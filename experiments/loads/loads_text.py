@@ -7,6 +7,7 @@ import numpy as np
 
 from idbench.experiments.document import Listing
 from idbench.experiments.loads.known_load import negative_mass
+from idbench.experiments.results.writing import finite
 from idbench.identify import IdentificationError
 from idbench.identify.basis.tree_links import KINDS
 from idbench.identify.loads.drive_gains import VAGUE, GainEstimate
@@ -115,5 +116,5 @@ def gains_summary(found: GainEstimate, given: Sequence[float], joints: Sequence[
         "joints": list(joints),
         "read_with": list(map(float, given)),
         "gains": [float(g) if told else None for g, told in zip(found.gains, found.shown, strict=True)],
-        "sigma": [float(s) if np.isfinite(s) else None for s in found.sigma],
+        "sigma": [finite(s) for s in found.sigma],
     }

@@ -18,15 +18,13 @@ from idbench.identify.loads.drive_gains import identify_drive_gains
 from idbench.identify.loads.loaded_robot import LETTERS, LoadedRobot
 from idbench.identify.loads.payload import WAYS, PayloadEstimate
 from idbench.sim.engine.run import Run
-from idbench.sim.engine.simulation import simulate
+from idbench.sim.engine.simulation import Progress, simulate
 from idbench.sim.robot.payload import Payload
 from idbench.sim.robot.tree import standard_parameters
 from idbench.sim.scenario.scenario import Scenario
 
 GAINS = (0.7, 1.4)  # True gains are drawn between these multiples of those that logs are read with
 MOST_RUNS = 1000  # Runs that are simulated at once
-
-Told = Callable[[float], None]
 
 Found: TypeAlias = tuple[tuple[str, ...], Array, Array, Array]
 """Names, estimate, sigma and truth."""
@@ -110,15 +108,14 @@ class Pairs:
         first, second = ((log,) for log in logs)
         return LoadedRobot(self.robot_model.tree, self.robot_model.grouping.standard, first, second, known=known)
 
-    def payloads(self, told: Told) -> dict[str, PairScore]:
+    def payloads(self, told: Progress) -> dict[str, PairScore]:
         """Accuracy of each way for the payload."""
-        found, ways = dict[str, PairScore](), list(WAYS)
-        for way, identify in WAYS.items():
-            one = partial(self._payload, identify)
-            found[way] = self._scored(one, partial(_part, told, ways.index(way), len(ways)))
+        found = dict[str, PairScore]()
+        for number, (way, identify) in enumerate(WAYS.items()):
+            found[way] = self._scored(partial(self._payload, identify), told, number, len(WAYS))
         return found
 
-    def gains(self, known: Mapping[str, float], told: Told) -> PairScore:
+    def gains(self, known: Mapping[str, float], told: Progress) -> PairScore:
         """Accuracy of gains that are drawn for each run, given the known payload."""
         rng, n = np.random.default_rng(self.scenario.seed), self.robot_model.tree.n
         true = rng.uniform(*GAINS, (self.runs, n))
@@ -137,7 +134,7 @@ class Pairs:
         base = robot.both.K[own, p:] @ np.array([self.truth[x] for x in LETTERS])
         return found.names, found.X, found.sigma, base
 
-    def _scored(self, one: Callable[[int], Found], told: Told) -> PairScore:
+    def _scored(self, one: Callable[[int], Found], told: Progress, number: int = 0, count: int = 1) -> PairScore:
         names: tuple[str, ...] = ()
         start = perf_counter()
         rows = list[tuple[Array, Array, Array]]()
@@ -148,13 +145,6 @@ class Pairs:
                 rows.append((truth, X - truth, (X - truth) / sigma))
             except IdentificationError as failed:
                 failures.append(str(failed))
-            told((run + 1) / self.runs)
-        if not rows:
-            empty = np.empty((0, 0))
-            return PairScore((), empty, empty, empty, 0.0, tuple(failures))
-        each = [np.array(x) for x in zip(*rows, strict=True)]
-        return PairScore(names, each[0], each[1], each[2], (perf_counter() - start) / self.runs, tuple(failures))
-
-
-def _part(told: Told, number: int, count: int, share: float) -> None:
-    told((number + share) / count)
+            told((number + (run + 1) / self.runs) / count)
+        truths, errors, z = (np.array([row[part] for row in rows]) for part in range(3))
+        return PairScore(names, truths, errors, z, (perf_counter() - start) / self.runs, tuple(failures))

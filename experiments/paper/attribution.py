@@ -5,7 +5,6 @@ where friction is small; quantization and ripple are noise; standstill touches t
 the power model alone; a gain error scales everything.
 """
 
-import json
 from dataclasses import dataclass, replace
 from typing import TypeAlias
 
@@ -30,7 +29,6 @@ from idbench.sim.frictions import Stribeck
 from idbench.sim.robot.scara import scara_truth
 from idbench.sim.scenario.measurement import TorqueMeasurement
 from idbench.sim.scenario.scenario import Physics, Scenario, Timing
-from idbench.sim.scenario.scenario_file import from_dict, to_dict
 
 Errors: TypeAlias = dict[str, Array]
 """Model -> signed error of every parameter [%]."""
@@ -80,28 +78,20 @@ def imperfections(table2: Scenario) -> list[Imperfection]:
 
 
 class Attribution:
-    """Errors of all imperfections; their logs are simulated on threads, while the twin is. No bit depends on the threads.
-
-    Parameters
-    ----------
-    table2 : Scenario
-        The robot and its motion.
-    threads : int
-        Simulations at a time.
-    """
+    """Errors of all imperfections; their logs are simulated on threads, while the twin is. No bit depends on the threads."""
 
     def __init__(self, table2: Scenario, threads: int = 2) -> None:
         self._imperfections = imperfections(table2)
-        every = list(dict.fromkeys(_key(one) for one in self._imperfections))
+        self._scenarios = every = [one.scenario for one in self._imperfections]  # some are alike
         self._pool = LocalPool(lambda which, progress: _simulated(every[which.start], progress), threads)
-        self._logs = {key: self._pool.submit(range(k, k + 1)) for k, key in enumerate(every)}
+        self._logs = {k: self._pool.submit(range(k, k + 1)) for k, one in enumerate(every) if every.index(one) == k}
 
     def errors(self, progress: Progress | None = None) -> dict[str, Errors]:
         """Return, for every imperfection, the signed error [%] of every parameter in each model."""
         found = dict[str, Errors]()
         try:
             for one in self._imperfections:
-                found[one.name] = errors_of(one, *self._logs[_key(one)].result())
+                found[one.name] = errors_of(one, *self._logs[self._scenarios.index(one.scenario)].result())
                 if progress:
                     progress(len(found) / len(self._imperfections))
         finally:
@@ -120,12 +110,7 @@ def errors_of(imperfection: Imperfection, log: MotionLog, truth: list[float]) ->
     return {form: estimate.error_percent(truth) for form, estimate in estimates.items()}
 
 
-def _key(imperfection: Imperfection) -> str:
-    """Return the scenario, which several imperfections may share."""
-    return json.dumps(to_dict(imperfection.scenario))
-
-
-def _simulated(scenario: str, progress: Progress) -> tuple[MotionLog, list[float]]:
-    """Return the log of a scenario in JSON, and the true parameters."""
-    run = simulate(from_dict(json.loads(scenario)), progress=progress)
+def _simulated(scenario: Scenario, progress: Progress) -> tuple[MotionLog, list[float]]:
+    """Return the log of a scenario, and the true parameters."""
+    run = simulate(scenario, progress=progress)
     return run.alone(), list(scara_truth(run.robots[0]).values())

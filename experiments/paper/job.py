@@ -1,4 +1,4 @@
-"""The jobs `table1` and `table2`: a request becomes the paper's comparison, or its experiment."""
+"""The job `table1`: a request becomes the paper's comparison, on its motion or one that is searched."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -8,12 +8,10 @@ import numpy as np
 
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.paper.table1 import CHAINS_COMPARED, PAPER, SCENARIO, Table1
-from idbench.experiments.paper.table2 import Table2
-from idbench.experiments.requests.jobs import Table1Request, Table2Request
+from idbench.experiments.requests.jobs import Table1Request
 from idbench.identify import CHAINS, MODELS, ExplicitModel, MotionLog, Problem, TorqueChannel, scara
 from idbench.identify.rows.row_map import Kernel
 from idbench.sim.engine.run import ideal_log
-from idbench.sim.engine.watch import Watch
 from idbench.sim.robot.motors import Array
 from idbench.sim.robot.robot import Robot
 from idbench.sim.scenario.scenario import Scenario
@@ -23,6 +21,16 @@ from idbench.sim.trajectories.quintic import draw_waypoint
 
 PAPER_CONDITION = {MODELS.create(name): PAPER[name].condition_number for name in ("explicit", "power")}
 """Cond(W) of the paper's Table 1; that of the implicit model is the explicit one's."""
+
+FS = 100.0  # Sampling frequency [Hz]
+REST = 3.0  # Time at rest at both ends [s]
+MOTION = 40.0  # Time from the first to the last move [s]
+MOVES = 22  # Moves, each within 15 % of MOTION / MOVES long, in whole samples
+CHAIN = "paper_masked"  # The chain in which the condition numbers are the paper's: its own steps, reversals left out
+CANDIDATES = 16  # Of a round
+
+Searching = Callable[[int, float], None]
+"""Hears the round of a search, and how far it is from the paper's condition numbers."""
 
 
 @dataclass(frozen=True)
@@ -35,16 +43,6 @@ class TrajectorySearch:
 
     seed: int = 0
     """Of everything random."""
-    fs: float = 100.0
-    """Sampling frequency [Hz]."""
-    rest: float = 3.0
-    """Time at rest at both ends [s]."""
-    motion: float = 40.0
-    """Time from the first to the last move [s]."""
-    moves: int = 22
-    """Number of moves, each within 15 % of motion / moves long, in whole samples."""
-    chain: str = "paper_masked"
-    """Name of the chain in which the condition numbers are the paper's: its own steps, reversals left out."""
     smallest_move: float = 0.4
     """Least change of every joint in every move [rad]: slower moves would be masked for whole rows."""
     clearance: float = 0.2
@@ -55,30 +53,22 @@ class TrajectorySearch:
     """It ends when both condition numbers are within this share of the paper's."""
     rounds: int = 300
     """Rounds after which it gives up."""
-    candidates: int = 16
-    """Candidates of a round."""
 
     def __post_init__(self) -> None:
         if self.seed < 0:
             raise ExperimentError(f"seed = {self.seed} must be 0 or a positive whole number")
-        for name in ("fs", "rest", "motion", "moves", "smallest_move", "velocity", "rounds", "candidates"):
+        for name in ("smallest_move", "velocity", "rounds"):
             if not getattr(self, name) > 0:
                 raise ExperimentError(f"{name} = {getattr(self, name)} must be above 0")
 
-    def run(self, robot: Robot, progress: Callable[[int, float], None] | None = None) -> Scenario:
-        """Return the scenario found; `progress` receives the number of every round and the distance that is left.
-
-        Raises
-        ------
-        ExperimentError
-            If the rounds end before the tolerance is reached.
-        """
+    def run(self, robot: Robot, progress: Searching | None = None) -> Scenario:
+        """Return the scenario found; ExperimentError if the rounds end before the tolerance is reached."""
         rng = np.random.default_rng(self.seed)
         durations = self._durations(rng)
         best, distance = self._scenario(robot, self._drawn(rng, robot), durations), inf
         excess = self.excess(robot, best)
         for number in range(self.rounds):
-            points = [self._redrawn(rng, robot, np.array(best.quintic().waypoints)) for _ in range(self.candidates)]
+            points = [self._redrawn(rng, robot, np.array(best.quintic().waypoints)) for _ in range(CANDIDATES)]
             others = [self._scenario(robot, p, durations) for p in points]
             if excess > 0:
                 best, excess = min([(best, excess), *((o, self.excess(robot, o)) for o in others)], key=lambda pair: pair[1])
@@ -87,7 +77,7 @@ class TrajectorySearch:
             if progress:
                 progress(number + 1, distance)
             if distance <= self.tolerance:
-                tried = (number + 1) * self.candidates
+                tried = (number + 1) * CANDIDATES
                 return replace(best, origin=f"idbench search --seed {self.seed}: {tried} candidates, chosen by Cond(W) alone")
         raise ExperimentError(
             f"no motion within {self.tolerance:.2%} of the paper's condition numbers in {self.rounds} rounds "
@@ -96,9 +86,9 @@ class TrajectorySearch:
 
     def distances(self, scenarios: Sequence[Scenario]) -> Array:
         """Return the largest departure from the paper's condition numbers, as a share; infinite if a row would be void."""
-        q = np.stack([scenario.quintic().points.sample(self.fs).q for scenario in scenarios])
-        log = MotionLog(self.fs, q, np.zeros_like(q), TorqueChannel("instantaneous"))  # W holds no torque
-        problem = Problem((log,), scara(), ExplicitModel(), replace(CHAINS.create(self.chain), trim=self.rest))
+        q = np.stack([scenario.quintic().points.sample(FS).q for scenario in scenarios])
+        log = MotionLog(FS, q, np.zeros_like(q), TorqueChannel("instantaneous"))  # W holds no torque
+        problem = Problem((log,), scara(), ExplicitModel(), replace(CHAINS.create(CHAIN), trim=REST))
         worst = np.zeros(len(scenarios))
         for model, target in PAPER_CONDITION.items():
             rows = problem.with_model(model).rows
@@ -121,19 +111,19 @@ class TrajectorySearch:
 
     def excess(self, robot: Robot, scenario: Scenario) -> float:
         """Excess of a motion over the limits of speed and torque, as a share; 0 or less if it keeps them."""
-        torque = np.abs(ideal_log(robot, scenario.quintic().points.sample(self.fs)).tau).max(axis=0)
+        torque = np.abs(ideal_log(robot, scenario.quintic().points.sample(FS)).tau).max(axis=0)
         used = np.concatenate([scenario.quintic().points.peak_velocity / self.velocity, torque / robot.torque_limits])
         return float(used.max() - 1)
 
     def _durations(self, rng: np.random.Generator) -> Array:
         """Return the times of the moves: whole samples, as the paper's plan of 100 Hz has them; together the motion's."""
-        shares = rng.uniform(0.85, 1.15, self.moves)
-        ends = np.rint(np.cumsum(shares) / shares.sum() * self.motion * self.fs)
-        return np.diff(ends, prepend=0.0) / self.fs
+        shares = rng.uniform(0.85, 1.15, MOVES)
+        ends = np.rint(np.cumsum(shares) / shares.sum() * MOTION * FS)
+        return np.diff(ends, prepend=0.0) / FS
 
     def _drawn(self, rng: np.random.Generator, robot: Robot) -> Array:
-        points = np.zeros((self.moves + 1, robot.n))
-        for k in range(self.moves + 1):
+        points = np.zeros((MOVES + 1, robot.n))
+        for k in range(MOVES + 1):
             points[k] = self._waypoint(rng, robot, points[max(k - 1, 0) : k])
         return points
 
@@ -147,32 +137,17 @@ class TrajectorySearch:
 
     def _scenario(self, robot: Robot, points: Array, durations: Array) -> Scenario:
         waypoints = tuple(tuple(float(x) for x in point) for point in points)
-        trajectory = Quintic(waypoints, tuple(float(T) for T in durations), self.rest)
-        return Scenario(f"search-{self.seed}", trajectory, robot.name, self.fs, self.seed)
-
-
-Searching = Callable[[int, float], None]
-"""Hears the round of a search, and how far it is from the paper's condition numbers."""
+        trajectory = Quintic(waypoints, tuple(float(T) for T in durations), REST)
+        return Scenario(f"search-{self.seed}", trajectory, robot.name, FS, self.seed)
 
 
 def table1_of(asked: Table1Request, searching: Searching | None = None) -> Table1:
-    """Return the paper's simulation comparison.
-
-    Raises
-    ------
-    ExperimentError, IdentificationError, BenchError
-        If something is wrong with the request.
-    """
+    """The paper's simulation comparison; ExperimentError, IdentificationError or BenchError if the request is wrong."""
     if asked.seed is not None and asked.scenario is not None:
         raise ExperimentError(f"--seed {asked.seed} and --scenario {asked.scenario} name two trajectories: give one")
     chains = CHAINS_COMPARED if asked.chain == "all" else (asked.chain,)
     scenario = load(asked.scenario or SCENARIO) if asked.seed is None else searched(asked.seed, searching)
     return Table1(scenario, chains)
-
-
-def table2_of(asked: Table2Request, progress: Callable[[float], None], watch: Watch | None = None) -> Table2:
-    """Return the paper's experiment on the virtual robot, to be closed by the caller."""
-    return Table2(load(asked.scenario), progress, watch)
 
 
 def searched(seed: int, searching: Searching | None = None) -> Scenario:

@@ -4,9 +4,11 @@ Expected: with the paper's own steps ZZR1 slightly too large in all models, by i
 models, by reversals; with chain `idbench` no error above 0.001 %, so that nothing but the method limited the paper.
 """
 
+import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from importlib.resources import files
 from typing import Any
 
 import numpy as np
@@ -18,8 +20,9 @@ from rich.text import Text
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.rates import Rates
 from idbench.experiments.paper.attribution import COMPARED
-from idbench.experiments.paper.conclusion import conclusion_line
+from idbench.experiments.program import program
 from idbench.experiments.results.writing import summarize
+from idbench.experiments.study.ratios import RatioRow, conclusion
 from idbench.experiments.text import markdown, print_table, printed
 from idbench.identify import (
     CHAINS,
@@ -165,7 +168,6 @@ class Table1:
 
 OVER = {"energy": "power", "integral": "implicit"}  # Models that are others, integrated
 
-
 FINER: dict[str, Any] = {"differentiator": CentralDifference(6)}
 UNFILTERED: dict[str, Any] = {"prefilter": NoPrefilter()}
 MASKED: dict[str, Any] = {"mask": paper_masked_chain().mask}
@@ -236,6 +238,17 @@ def print_table1(console: Console, table: Table1) -> None:
     console.print(Text(conclusion_line()))
 
 
+def conclusion_line() -> str:
+    """The paper's conclusion as the study `models` finds it, which stands below both tables, and the command that computes it.
+
+    The ratios of the study over 200 motions ship with the package.
+    """
+    text = files("idbench.experiments.paper").joinpath("conclusion.json").read_text(encoding="utf-8")
+    found: list[RatioRow] = json.loads(text)["ratios"]
+    of = f"{min(row['runs'] for row in found)} motions or more; {program()} study models --seeds 200"
+    return f"The paper's conclusion, with 95 % confidence intervals ({of}): {conclusion(found)}"
+
+
 def _model_table(table: Table1, form: str) -> Table:
     """Return a model's table: truth, what the paper prints, and what every chain gives."""
     paper, estimates = PAPER.get(form), [found[form] for found in table.estimates.values()]
@@ -248,7 +261,8 @@ def _model_table(table: Table1, form: str) -> Table:
     truth = list(table.truth.values())
     for i, (name, true) in enumerate(table.truth.items()):
         printed = (f"{paper.estimate[i]:.3f}", f"{paper.error[i]:.3f}") if paper else ()
-        grid.add_row(name, f"{true:g}", *printed, *(cell for e in estimates for cell in _cells(e, truth, i)))
+        found = [(f"{e.X[i]:.5f}", f"{e.relative_error_percent(truth)[i]:.2g}") for e in estimates]
+        grid.add_row(name, f"{true:g}", *printed, *(cell for cells in found for cell in cells))
     grid.add_section()
     printed = (f"{paper.condition_number:g}", "") if paper else ()
     grid.add_row("Cond(W)", "", *printed, *(cell for e in estimates for cell in (f"{e.condition_number:.1f}", "")))
@@ -276,10 +290,6 @@ def _causes_table(table: Table1) -> Table:
     for name, worst in causes(table):
         grid.add_row(name, *(f"{error:.1g}" for w in worst.values() for error in (w.inertia, w.friction)))
     return grid
-
-
-def _cells(estimate: Estimate, truth: list[float], i: int) -> tuple[str, str]:
-    return f"{estimate.X[i]:.5f}", f"{estimate.relative_error_percent(truth)[i]:.2g}"
 
 
 def table1_markdown(table: Table1) -> str:

@@ -22,7 +22,7 @@ from idbench.experiments.identification.method import Method
 from idbench.experiments.identification.request import Request
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.paper.attribution import Attribution, Errors
-from idbench.experiments.paper.conclusion import conclusion_line
+from idbench.experiments.paper.table1 import conclusion_line
 from idbench.experiments.text import new_table, percent, print_table, printed
 from idbench.identify import CHAINS, Estimate, TorqueChannel
 from idbench.sim.engine.run import Run
@@ -31,8 +31,6 @@ from idbench.sim.engine.watch import Watch
 from idbench.sim.robot.scara import scara_truth
 from idbench.sim.scenario.scenario import Scenario
 from idbench.sim.scenario.scenario_file import to_dict
-
-SCENARIO = "table2"  # The scenario that ships
 
 REALIZATIONS: Mapping[str, int] = {"explicit": 2, "implicit": 2, "power": 4}
 """Realizations of the trajectory that make r = 1600 rows (section 7.3)."""

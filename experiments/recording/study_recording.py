@@ -17,12 +17,12 @@ from idbench.experiments.recording.folder import BASE
 from idbench.experiments.recording.layouts import tabs
 from idbench.experiments.recording.scales import Words, decades, linear, named
 from idbench.experiments.recording.stream import Stream
-from idbench.experiments.study.answer import short, value, where
+from idbench.experiments.study.answer import in_words, short, where
 from idbench.experiments.study.axis import Axis
 from idbench.experiments.study.ratios import study_answer
 from idbench.experiments.study.statistics import MIN_ERROR, Cell
 from idbench.experiments.study.study import Study
-from idbench.experiments.study.worst_runs import command, worst_runs
+from idbench.experiments.study.study_results import command, worst_runs
 from idbench.experiments.text import FORMS, GREY, JOINTS, Color, lighter
 from idbench.identify import Array
 
@@ -63,7 +63,7 @@ class AxisCharts:
 
     @property
     def _x(self) -> Words:
-        return named(short(self.axis.field), [value(self.axis.label(v)) for v in self.axis.points])
+        return named(short(self.axis.field), [in_words(self.axis.label(v)) for v in self.axis.points])
 
     @cached_property
     def _lines(self) -> dict[tuple[Any, ...], list[Cell]]:
@@ -115,13 +115,13 @@ class AxisCharts:
 
     def _draw(self, chart: Chart, line: Sequence[Cell], y: Array) -> None:
         x, color = np.array([self._place(cell) for cell in line]), self._color(line[0].names)
-        name = "_".join([*line[0].names, *(value(v) for k, v in line[0].settings.items() if k != self.axis.field)])
+        name = "_".join([*line[0].names, *(in_words(v) for k, v in line[0].settings.items() if k != self.axis.field)])
         chart.line(name, x, y, color, listed=False)
         chart.marks(name, x, y, color, self._symbol(line[0].names[:2]))
 
     def _name_others(self, chart: Chart, line: Sequence[Cell]) -> None:
         """Write the values of the other axes at the end of a line, of the first model only."""
-        others = [value(v) for name, v in line[0].settings.items() if name != self.axis.field]
+        others = [in_words(v) for name, v in line[0].settings.items() if name != self.axis.field]
         if others and line[0].names[2] == self._models[0]:
             at = np.array([self._place(line[-1])]), np.array([PERCENT * line[-1].typical])
             chart.write(f"others/{'_'.join([*line[0].names, *others])}", *at, [", ".join(others)])
@@ -134,7 +134,7 @@ class AxisCharts:
         chart = Chart(self.stream, path, named("", words), decades("error [%]", low), NARROW)
         for cell, size in zip(self.cells, sizes, strict=True):
             some = size[:: max(1, len(size) // DOTS)]
-            name = "_".join([*cell.names, *map(value, cell.settings.values())])
+            name = "_".join([*cell.names, *map(in_words, cell.settings.values())])
             chart.dots(name, np.full(len(some), self._place(cell)), some, lighter(self._color(cell.names), 1))
         for line in self._lines.values():
             self._draw(chart, line, np.array([PERCENT * cell.rmse[p] for cell in line]))

@@ -1,7 +1,5 @@
 """An example to work on: the file of an arm, two logs that it recorded, and its true parameters."""
 
-import csv
-import io
 import tempfile
 from collections.abc import Mapping
 from dataclasses import replace
@@ -25,18 +23,7 @@ MOVES, VELOCITY = 5, 2.0  # Moves of a log for each joint, and their largest spe
 
 
 def example_files(name: str) -> dict[str, str]:
-    """Return the files of an example, by their names.
-
-    Parameters
-    ----------
-    name : str
-        Name of a shipped robot.
-
-    Returns
-    -------
-    dict
-        The arm in MJCF, logs of two motions in closed loop, and a table of the true base parameters.
-    """
+    """Files of an example by their names: a shipped arm in MJCF, logs of two motions in closed loop, true base parameters."""
     robot, plain = Robot.load(name), load_scenario("arm")
     contents = {"arm.xml": Robot.path(name).read_text(encoding="utf-8")}
     for file, seed in LOGS.items():
@@ -57,9 +44,5 @@ def _table(robot: Robot, standard: Mapping[str, float]) -> str:
     """Return the true base parameters as CSV."""
     tree = kinematic_tree(robot)
     base = BaseParameters.of(tree, tree_basis(tree))
-    text = io.StringIO()
     rows = zip(base.values(standard).items(), base.basis.units, strict=True)
-    csv.writer(text, lineterminator="\n").writerows(
-        [("parameter", "value", "unit"), *((k, f"{x:.6g}", u) for (k, x), u in rows)]
-    )
-    return text.getvalue()
+    return "".join(["parameter,value,unit\n", *(f"{name},{x:.6g},{unit}\n" for (name, x), unit in rows)])

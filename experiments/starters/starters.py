@@ -58,13 +58,7 @@ def new_study(name: str, out: Path) -> None:
 
 
 def new_example(name: str, robot: str, out: Path) -> None:
-    """Write a shipped arm, two of its logs and its true parameters into a new folder.
-
-    Raises
-    ------
-    ExperimentError
-        If there is no such robot, or something is there already.
-    """
+    """Write a shipped arm, two of its logs and its true parameters; ExperimentError if one is not there, or `out` is."""
     from idbench.experiments.starters.example import example_files
 
     _checked(name)
@@ -77,10 +71,7 @@ def new_example(name: str, robot: str, out: Path) -> None:
 def new_plugin(name: str, kind: str, out: Path) -> None:
     """Write the package of a plug-in that installs and keeps its contract.
 
-    Raises
-    ------
-    ExperimentError
-        If there is no such kind, the name cannot be one, or there is something of that name already.
+    ExperimentError if there is no such kind, the name cannot be one, or there is something of that name already.
     """
     if kind not in KINDS:
         raise ExperimentError(f"no kind of plug-in {kind!r}{did_you_mean(kind, KINDS)}; known: {', '.join(KINDS)}")

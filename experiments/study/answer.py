@@ -17,15 +17,7 @@ LINES = "encoder.lines"  # The setting that people know as bits
 
 
 def requirements(cells: Sequence[Cell], edges: int = 4) -> str:
-    """Threshold of some typical errors on the only setting that varies, in words; empty if it does not decide the error.
-
-    Parameters
-    ----------
-    cells : sequence of Cell
-        Of one way of identification.
-    edges : int
-        Edges that are counted in a line of an encoder.
-    """
+    """Threshold of some typical errors on the only setting that varies, in words; empty if it does not decide the error."""
     fields = [field for field in cells[0].settings if field != FRICTION]
     varied = [field for field in fields if len({str(cell.settings[field]) for cell in cells}) > 1]
     if len(varied) != 1 or not all(isinstance(cell.settings[varied[0]], float) for cell in cells):
@@ -43,10 +35,10 @@ def _requirements(cells: Sequence[Cell], field: str, edges: int) -> Iterator[str
         enough = [k for k in range(len(weakest_first)) if all(cell.typical <= level for cell in weakest_first[k:])]
         if enough and enough[0] > 0:
             value = weakest_first[enough[0]].settings[field]
-            yield f"{100 * level:g} % requires {field} of at {'most' if rises else 'least'} {in_words(field, value, edges)}"
+            yield f"{100 * level:g} % requires {field} of at {'most' if rises else 'least'} {in_words(value, field, edges)}"
 
 
-def in_words(field: str, value: object, edges: int = 4) -> str:
+def in_words(value: object, field: str = "", edges: int = 4) -> str:
     """Return the value of a setting as text, lines of an encoder with their bits."""
     if not isinstance(value, float):
         return str(value)
@@ -55,15 +47,7 @@ def in_words(field: str, value: object, edges: int = 4) -> str:
 
 
 def answer(cells: Sequence[Cell], edges: int = 4) -> str:
-    """Best model and chain, its margin, and the coverage of its sigma, in words.
-
-    Parameters
-    ----------
-    cells : sequence of Cell
-        All of a study.
-    edges : int
-        Edges that are counted in a line of an encoder.
-    """
+    """Best model and chain, its margin, and the coverage of its sigma, in words; `edges` as `Study.edges`."""
     solved = [cell for cell in cells if cell.runs]
     if not solved:
         return f"No run gave an estimate. {failures(cells)}"
@@ -169,7 +153,7 @@ def failures(cells: Sequence[Cell]) -> str:
 
 def combination(cell: Cell) -> str:
     """Return the settings of a cell in words."""
-    return ", ".join(f"{short(name)} {value(x)}" for name, x in settings_of(cell).items())
+    return ", ".join(f"{short(name)} {in_words(x)}" for name, x in settings_of(cell).items())
 
 
 def settings_of(cell: Cell) -> dict[str, Any]:
@@ -195,11 +179,6 @@ def where(cell: Cell, among: Sequence[Cell]) -> str:
 def short(field: str) -> str:
     """Return the name of a field without the word that all of its kind begin with."""
     return field.removeprefix("chain.")
-
-
-def value(x: Any) -> str:
-    """Return the value of an axis as text."""
-    return in_words("", x)
 
 
 def percent(share: float) -> str:

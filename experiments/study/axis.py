@@ -204,11 +204,6 @@ def servo_methods(friction: str, axes: Sequence[Axis]) -> Iterator[Combination]:
         yield Combination(method, laws, combination)
 
 
-def of_currents() -> Combination:
-    """Combination for the torque of servos' currents, in the place of that for their closed loop."""
-    return Combination(Method.named(), "standard", ())
-
-
 def combinations(axes: Sequence[Axis]) -> Iterator[tuple[Setting, ...]]:
     """Yield every combination of the axes' values, the last axis fastest."""
     return product(*([Setting(axis, value) for value in axis.points] for axis in axes))

@@ -1,5 +1,6 @@
 """Running the shards of a study on Dask workers: of this machine, or of many."""
 
+import json
 import logging
 import signal
 import sys
@@ -8,7 +9,7 @@ from collections.abc import Iterator
 from concurrent.futures import Future
 from contextlib import ExitStack, contextmanager
 from functools import cache, lru_cache
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import version
 from typing import TYPE_CHECKING
 
 from threadpoolctl import threadpool_limits
@@ -16,18 +17,16 @@ from threadpoolctl import threadpool_limits
 from idbench.experiments.errors import StudyError
 from idbench.experiments.study.shard import Shard, run_shard
 from idbench.experiments.study.study import Study
-from idbench.experiments.study.study_file import study_from_text
+from idbench.experiments.study.study_file import study_from
 
 if TYPE_CHECKING:
     from distributed import Client
-
-MADE_BY = ("idbench", "mujoco", "numpy", "scipy", "ruckig")
 
 
 @cache
 def versions() -> dict[str, str]:
     """Return the versions of the packages on which the bits of a result depend."""
-    return {name: _version(name) for name in MADE_BY}
+    return {name: version(name) for name in ("idbench", "mujoco", "numpy", "scipy", "ruckig")}
 
 
 def require_versions(theirs: dict[str, str], whose: str) -> None:
@@ -35,13 +34,6 @@ def require_versions(theirs: dict[str, str], whose: str) -> None:
     other = [f"{name} {theirs.get(name)} (here {here})" for name, here in versions().items() if theirs.get(name) != here]
     if other:
         raise StudyError(f"{whose} has {', '.join(other)}: the same study needs the same versions everywhere")
-
-
-def _version(name: str) -> str:
-    try:
-        return version(name)
-    except PackageNotFoundError:
-        return "unknown"
 
 
 PATIENCE = 10.0  # How long [s] a scheduler may take to answer, and workers may be away before it is said
@@ -56,21 +48,9 @@ QUIET = {
 
 @contextmanager
 def cluster_pool(study: Study, scheduler: str | None, workers: int) -> Iterator["ClusterPool"]:
-    """Give the workers of a scheduler, or of as many new processes of this machine.
+    """Give the workers of the scheduler at an address, or else of as many new processes of this machine.
 
-    Parameters
-    ----------
-    study : Study
-        What to run.
-    scheduler : str, optional
-        Its address.
-    workers : int
-        Processes, where no scheduler is given.
-
-    Raises
-    ------
-    StudyError
-        If Dask is not installed, the scheduler cannot be reached, or the workers are lost.
+    StudyError if Dask is not installed, the scheduler cannot be reached, or the workers are lost.
     """
     try:
         import dask
@@ -135,15 +115,7 @@ DESERTED = 600.0  # How long [s] a study waits for workers when all have gone
 
 
 class ClusterPool:
-    """Shards on the workers of a Dask cluster, each on one thread; a lost worker's shards go to others.
-
-    Parameters
-    ----------
-    study : Study
-        What to run.
-    client : distributed.Client
-        The cluster.
-    """
+    """Shards on the workers of a Dask cluster, each on one thread; a lost worker's shards go to others."""
 
     def __init__(self, study: Study, client: "Client") -> None:
         self._study, self._client = study, client
@@ -191,4 +163,4 @@ def compute(text: str, first: int, stop: int, theirs: dict[str, str]) -> Shard:
 
 @lru_cache(maxsize=2)
 def _study(text: str) -> Study:
-    return study_from_text(text)
+    return study_from(json.loads(text), "study")

@@ -57,16 +57,9 @@ def _difference(a: Cell, b: Cell, draws: int) -> Difference:
 
 
 def _probability(one: Array, other: Array, gap: float, draws: int) -> float:
-    """Permutation p value of a gap between the errors of two methods.
+    """Permutation p value of a gap between the typical errors of two methods, in logarithms, by at most so many draws.
 
-    Parameters
-    ----------
-    one, other : Array, shape (run, p)
-        Squares of their errors.
-    gap : float
-        Difference of the logarithms of their typical errors.
-    draws : int
-        Most draws.
+    `one` and `other` are squares of their errors, shape (run, p).
     """
     rng = np.random.default_rng(0)
     count = 1

@@ -1,6 +1,6 @@
 """The figures of a study's report, as SVG."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -9,7 +9,7 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
 from idbench.experiments.reports.drawn import svg
-from idbench.experiments.study.answer import in_words, value
+from idbench.experiments.study.answer import in_words
 from idbench.experiments.study.axis import Axis
 from idbench.experiments.study.statistics import RIGHT, Cell
 from idbench.experiments.text import FORMS, SIGMAS
@@ -33,10 +33,10 @@ def typical_figure(families: Mapping[str, Sequence[Cell]], axis: Axis, edges: in
     for spare in grid[len(families) :]:
         spare.set_visible(False)
     for panel, (title, cells) in zip(grid, families.items(), strict=False):
-        for model, group in _models(cells).items():
-            x, y = _places(panel, group, axis, edges, TICKS), np.array([100 * c.typical for c in group])
+        for model, group, x, style in _curves(panel, cells, axis, edges, TICKS):
+            y = np.array([100 * c.typical for c in group])
             ends = np.abs(100 * np.array([c.typical_interval for c in group]).T - y)
-            panel.errorbar(x, y, ends, color=_color(model), label=model, lw=_width(cells, model), marker=".", capsize=2)
+            panel.errorbar(x, y, ends, **style, label=model, marker=".", capsize=2)
             if np.isfinite(least := np.array([100 * c.typical_least() for c in group])).any():
                 panel.plot(x, least, color="black", ls=":", lw=1.0, label="bound")
         panel.set_yscale("log")
@@ -55,15 +55,12 @@ def error_figure(cells: Sequence[Cell], axis: Axis) -> str:
         return matrix_figure(_rows_of(cells, axis), cells[0].parameters, values, "rms error [%]")
     figure, panels = _panels(cells[0].parameters)
     for p, panel in enumerate(panels.values()):
-        for model, group in _models(cells).items():
-            x = _places(panel, group, axis)
-            color = _color(model)
-            wide = _width(cells, model)
-            panel.plot(x, [100 * c.deviation[p] for c in group], color=color, label=f"{model}: spread", lw=wide, marker=".")
+        for model, group, x, style in _curves(panel, cells, axis):
+            panel.plot(x, [100 * c.deviation[p] for c in group], **style, label=f"{model}: spread", marker=".")
             bias = np.array([100 * abs(c.bias[p]) for c in group])
-            panel.plot(x, bias, color=color, ls=":", label=f"{model}: |bias|", lw=wide)
+            panel.plot(x, bias, **style, ls=":", label=f"{model}: |bias|")
             sure = np.array([abs(c.bias[p]) > c.bias_margin[p] for c in group])
-            panel.plot(np.array(x)[sure], bias[sure], "o", color=color, ms=3)
+            panel.plot(x[sure], bias[sure], "o", color=style["color"], ms=3)
         if any((np.asarray(line.get_ydata()) > 0).any() for line in panel.lines):  # a truth of 0 has no relative error
             panel.set_yscale("log")
     return svg(_finished(figure, panels, axis.field, "error [%]"))
@@ -78,17 +75,12 @@ def coverage_figure(cells: Sequence[Cell], axis: Axis) -> str:
     figure, panels = _panels(cells[0].parameters)
     for p, panel in enumerate(panels.values()):
         panel.axhline(100 * RIGHT, color="black", lw=1.0, ls="--")
-        for model, group in _models(cells).items():
-            x = _places(panel, group, axis)
-            color = _color(model)
-            wide = _width(cells, model)
+        for model, group, x, style in _curves(panel, cells, axis):
             low, high = (np.array([100 * c.coverage_interval(c.sigma)[p, i] for c in group]) for i in (0, 1))
-            panel.plot(
-                x, [100 * c.coverage(c.sigma)[p] for c in group], color=color, label=f"{model}: corrected", lw=wide, marker="."
-            )
-            panel.fill_between(x, low, high, color=color, alpha=0.08, lw=0)
+            panel.plot(x, [100 * c.coverage(c.sigma)[p] for c in group], **style, label=f"{model}: corrected", marker=".")
+            panel.fill_between(x, low, high, color=style["color"], alpha=0.08, lw=0)
             paper = [100 * c.coverage(c.paper_sigma)[p] for c in group]
-            panel.plot(x, paper, color=color, ls=":", label=f"{model}: paper's", lw=wide)
+            panel.plot(x, paper, **style, ls=":", label=f"{model}: paper's")
         panel.set_ylim(-3, 103)
     return svg(_finished(figure, panels, axis.field, f"truth within {SIGMAS:g} sigma [%]"))
 
@@ -108,7 +100,7 @@ def matrix_figure(rows: Sequence[str], parameters: Sequence[str], values: Array,
 
 
 def _rows_of(cells: Sequence[Cell], axis: Axis) -> list[str]:
-    return [f"{value(cell.settings[axis.field])} {cell.names[2]}" if cell.settings else cell.names[2] for cell in cells]
+    return [f"{in_words(cell.settings[axis.field])} {cell.names[2]}" if cell.settings else cell.names[2] for cell in cells]
 
 
 def bars_figure(cells: Sequence[Cell]) -> str:
@@ -188,14 +180,22 @@ def _panels(parameters: Sequence[str], below: float = 0.6, gap: float = 0.3) -> 
     return figure, dict(zip(parameters, grid, strict=False))
 
 
-def _models(cells: Sequence[Cell]) -> dict[str, list[Cell]]:
+def _curves(
+    panel: Panel, cells: Sequence[Cell], axis: Axis, edges: int = 4, ticks: int = SMALL_TICKS
+) -> Iterator[tuple[str, list[Cell], Array, dict[str, Any]]]:
+    """Yield each model, its cells, their places on an axis, and how curves look.
+
+    Those drawn first are wider, and show beneath others that they agree with.
+    """
     groups: dict[str, list[Cell]] = {}
     for cell in cells:
         groups.setdefault(cell.names[2], []).append(cell)
-    return groups
+    for k, (model, group) in enumerate(groups.items()):
+        color = tuple(c / 255 for c in FORMS.get(model, OTHER))
+        yield model, group, _places(panel, group, axis, edges, ticks), {"color": color, "lw": 1.2 * (len(groups) - k)}
 
 
-def _places(panel: Panel, group: Sequence[Cell], axis: Axis, edges: int = 4, ticks: int = SMALL_TICKS) -> Array:
+def _places(panel: Panel, group: Sequence[Cell], axis: Axis, edges: int, ticks: int) -> Array:
     """Places of the cells on an axis, logarithmic if its values are far apart, counted if they are words.
 
     What is written beside the axis are its own values.
@@ -203,7 +203,7 @@ def _places(panel: Panel, group: Sequence[Cell], axis: Axis, edges: int = 4, tic
     values = [cell.settings[axis.field] for cell in group]
     if not axis.numeric:
         words = [axis.label(v) for v in axis.points]
-        panel.set_xticks(range(len(words)), [value(word) for word in words], rotation=20)
+        panel.set_xticks(range(len(words)), [in_words(word) for word in words], rotation=20)
         return np.array([words.index(v) for v in values], dtype=np.float64)
     numbers = np.array(axis.points, dtype=np.float64)
     positive = numbers[numbers > 0]
@@ -213,19 +213,10 @@ def _places(panel: Panel, group: Sequence[Cell], axis: Axis, edges: int = 4, tic
         else:
             panel.set_xscale("symlog", linthresh=float(positive.min()))
     some = numbers[:: 1 + len(numbers) // ticks]
-    written = [in_words(axis.field, x, edges).replace(" (", "\n(") for x in some.tolist()]
+    written = [in_words(x, axis.field, edges).replace(" (", "\n(") for x in some.tolist()]
     panel.set_xticks(some.tolist(), labels=written, fontsize=7)
     panel.set_xticks([], minor=True)
     return np.array(values, dtype=np.float64)
-
-
-def _width(cells: Sequence[Cell], model: str) -> float:
-    """Return the width of a model's curves: those drawn first are wider, and show beneath others that they agree with."""
-    return 1.2 * (len(_models(cells)) - list(_models(cells)).index(model))
-
-
-def _color(model: str) -> tuple[float, ...]:
-    return tuple(c / 255 for c in FORMS.get(model, OTHER))
 
 
 def _finished(figure: Figure, panels: dict[str, Panel], axis: str, y: str) -> Figure:

@@ -20,10 +20,7 @@ LARGEST_SHARD = 64  # Runs that are simulated together at most
 def store_of(asked: StudyRequest, out: Path | None = None, *, many: bool = False) -> Store:
     """Return the store of a study: a new one in the folder `out`, or that which is to be resumed.
 
-    Raises
-    ------
-    StudyError, ExperimentError, BenchError
-        If something is wrong with the request; if the study has very many runs and they are not meant (`many`).
+    StudyError, ExperimentError or BenchError if something is wrong with the request, or very many runs are not meant (`many`).
     """
     for name in ("seeds", "shard", "threads", "workers"):
         value = getattr(asked, name)
@@ -48,16 +45,14 @@ def worker_pool(asked: StudyRequest, store: Store) -> AbstractContextManager[Any
     """Context of the pool that computes shards; without a pool if nothing is missing."""
     from idbench.experiments.study.cluster import cluster_pool
 
-    scheduler = asked.scheduler
-    workers = asked.workers
-    threads = asked.threads
-    width = width_of(asked)
-    given = [f"--{what}" for what, value in (("workers", workers), ("threads", threads)) if value is not None]
-    if (scheduler and given) or len(given) > 1:
-        raise StudyError(f"{', '.join(['--scheduler'] * bool(scheduler) + given)} name several places to run: give one")
+    given = [f"--{what}" for what in ("scheduler", "workers", "threads") if getattr(asked, what)]
+    if len(given) > 1:
+        raise StudyError(f"{', '.join(given)} name several places to run: give one")
     if next(store.missing(1), None) is None:
         return nullcontext()
-    return cluster_pool(store.study, scheduler, width) if scheduler or workers else local_pool(store.study, width)
+    if asked.scheduler or asked.workers:
+        return cluster_pool(store.study, asked.scheduler, width_of(asked))
+    return local_pool(store.study, width_of(asked))
 
 
 def _begun(name: str, out: Path | None, seeds: int | None, many: bool) -> Store:

@@ -11,7 +11,7 @@ from idbench.experiments.identification.robot_model import RobotModel, absolute
 from idbench.experiments.identification.scenario_run import ScenarioRun
 from idbench.experiments.requests.jobs import RunRequest
 from idbench.experiments.requests.shared import Parameters
-from idbench.experiments.study.axis import Combination, of_currents
+from idbench.experiments.study.axis import Combination
 from idbench.sim.drives import IdealDrive
 from idbench.sim.errors import RobotError
 from idbench.sim.robot.robot import Robot
@@ -24,10 +24,7 @@ from idbench.sim.trajectories import Quintic
 def run_of(asked: RunRequest, tell: Callable[[str], None]) -> ScenarioRun:
     """Scenario and request of a run; `tell` hears what was assumed.
 
-    Raises
-    ------
-    ExperimentError, IdentificationError, BenchError
-        If something is wrong with the request, or with the files that it names.
+    ExperimentError, IdentificationError or BenchError if something is wrong with the request, or with the files that it names.
     """
     if asked.scenario is None:
         if asked.robot is not None:
@@ -80,7 +77,8 @@ def _again(
     number, methods = method or 0, store.study.methods
     if not 0 <= number < len(methods):
         raise ExperimentError(f"--method {number} does not exist: the study has methods 0 to {len(methods) - 1}")
-    chosen = of_currents() if store.study.of_servos else methods[number]
+    of_currents = Combination(Method.named(), "standard", ())  # in the place of that for the closed loop of servos
+    chosen = of_currents if store.study.of_servos else methods[number]
     rows, known = compare_again(store, index)
     tell(
         f"run {index} of {folder}: all {len(rows)} rows are the same again, bit for bit"

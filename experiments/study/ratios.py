@@ -2,24 +2,21 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from idbench.experiments.study.answer import answer, combination, failures
 from idbench.experiments.study.comparison import ln_typical
 from idbench.experiments.study.statistics import CONFIDENCE, Cell
+from idbench.experiments.study.study import Study
 from idbench.experiments.text import new_table
 from idbench.identify.models import THREE
-
-if TYPE_CHECKING:
-    from idbench.experiments.study.study import Study
 
 DRAWS = 2000  # Of a bootstrap: the ends of an interval are then known to some 3 % of its width
 
 PAIRS = (("implicit", "explicit"), ("power", "explicit"), ("energy", "power"), ("integral", "implicit"))
 """Models that the paper compares: the one whose errors are divided, and by whose."""
-
 
 NOISES = {
     "ripple": "with ripple, the paper's experiment",
@@ -135,7 +132,7 @@ def interval(row: RatioRow) -> str:
     return f"{row['ratio']:.2g} ({row['low']:.2g} to {row['high']:.2g})"
 
 
-def study_answer(study: "Study", found: Sequence[Cell]) -> str:
+def study_answer(study: Study, found: Sequence[Cell]) -> str:
     """Return the answer of a study: the ratios of the models' errors, or which method errs least."""
     if not (compares_models(study) and any(cell.runs for cell in found)):
         return answer(found, study.edges)
@@ -143,7 +140,7 @@ def study_answer(study: "Study", found: Sequence[Cell]) -> str:
     return " ".join(filter(None, parts)) or answer(found, study.edges)
 
 
-def compares_models(study: "Study") -> bool:
+def compares_models(study: Study) -> bool:
     """True if a study compares the models over kinds of noise, by equal numbers of rows.
 
     It has too many methods for a test of every pair: the draws of a permutation test grow with the number of pairs.

@@ -1,9 +1,9 @@
 """Running a study: shards in parallel, each written when it is done."""
 
 import threading
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
-from contextlib import contextmanager
+from contextlib import closing
 from typing import Any, Generic, TypeVar
 
 from threadpoolctl import threadpool_limits
@@ -12,16 +12,11 @@ from idbench.experiments.errors import StudyError
 from idbench.experiments.study.shard import Shard, run_shard
 from idbench.experiments.study.store import Store
 from idbench.experiments.study.study import Study
+from idbench.sim.engine.simulation import Progress
 
 
 def compare_again(store: Store, run: int) -> tuple[list[dict[str, Any]], bool]:
-    """Return the rows of a run, made again alone, and whether the study has it already.
-
-    Raises
-    ------
-    StudyError
-        If there is no such run, or the study has other bits for it.
-    """
+    """Rows of a run, made again alone, and whether the study has it; StudyError if it has other bits, or no such run."""
     store.study.scenario_of(run)
     made, known = run_shard(store.study, range(run, run + 1)).rows, store.rows_of(run)
     for here, there in zip(made, known, strict=bool(known)):
@@ -40,9 +35,6 @@ Part = TypeVar("Part")
 
 POLL = 0.2  # How often [s] the progress is shown while shards are computed
 
-Watch = Callable[[float], None]
-"""Receives the number of runs that are done, parts of shards included."""
-
 
 class CancelledError(Exception):
     """Raised inside shards that shall not go on."""
@@ -51,15 +43,10 @@ class CancelledError(Exception):
 class LocalPool(Generic[Part]):
     """Parts of a work on the threads of this process, such as shards: MuJoCo and NumPy let each other run.
 
-    Parameters
-    ----------
-    compute : callable
-        Makes the part of some numbers, such as those of runs; tells the share of it that is done.
-    threads : int
-        Parts at a time, each on one native thread.
+    `compute` makes the part of some numbers, such as those of runs, on one native thread, and tells the share that is done.
     """
 
-    def __init__(self, compute: Callable[[range, Watch], Part], threads: int) -> None:
+    def __init__(self, compute: Callable[[range, Progress], Part], threads: int) -> None:
         self.width = threads
         self._compute = compute
         self._stop = threading.Event()
@@ -94,33 +81,18 @@ class LocalPool(Generic[Part]):
             self._done.pop(runs[0], None)
 
 
-@contextmanager
-def local_pool(study: Study, threads: int) -> Iterator[LocalPool[Shard]]:
-    """Give a pool of threads for the shards of a study, closed at the end."""
-    pool = LocalPool(lambda runs, progress: run_shard(study, runs, progress=progress), threads)
-    try:
-        yield pool
-    finally:
-        pool.close()
+def local_pool(study: Study, threads: int) -> closing[LocalPool[Shard]]:
+    """Context of a pool of threads for the shards of a study."""
+    return closing(LocalPool(lambda runs, progress: run_shard(study, runs, progress=progress), threads))
 
 
 def run_missing(
-    store: Store, pool: LocalPool[Shard], shard: int, watch: Watch, finished_shard: Callable[[range], None] | None = None
+    store: Store, pool: LocalPool[Shard], shard: int, watch: Progress, finished_shard: Callable[[range], None] | None = None
 ) -> None:
-    """Run what a study lacks; what is finished when this is interrupted is kept.
+    """Run what a study lacks, in shards of at most `shard` runs; what is finished when this is interrupted is kept.
 
-    Parameters
-    ----------
-    store : Store
-        The study and its folder.
-    pool : LocalPool or the like
-        Where shards are computed.
-    shard : int
-        Most runs of a shard.
-    watch : callable
-        Receives how many runs of this call are done.
-    finished_shard : callable, optional
-        Receives the runs of every shard when it is kept.
+    `watch` receives how many runs of this call are done, parts of shards included; `finished_shard` the runs of every shard
+    when it is kept.
     """
     todo = store.missing(shard)
     pending = dict[Future[Shard], range]()

@@ -15,8 +15,6 @@ from idbench.identify.files.servo_log import ServoColumns
 from idbench.identify.servo import ServoFit, identify_servo, parameters_of
 from idbench.sim.drives import ServoDrive
 from idbench.sim.engine.run import Run
-from idbench.sim.robot.payload import Payload
-from idbench.sim.robot.robot import Robot
 from idbench.sim.robot.servos import links
 from idbench.sim.scenario.scenario import Scenario
 from idbench.sim.settings import per_joint
@@ -94,10 +92,8 @@ def _joints(scenario: Scenario, log: MotionLog) -> Joints:
     columns = ServoColumns(
         log.t, log.q, log.conditions["command"], None if on is None else np.broadcast_to(on, log.q.shape), None
     )
-    robot = _links(scenario.robot, scenario.payload)
+    robot = _links(scenario.robot, payload=scenario.payload)
     return Joints(robot, (JointsLog("the log", columns, tuple(servos), robot),))
 
 
-@cache
-def _links(robot: str, payload: Payload) -> Robot:
-    return links(robot, payload=payload)
+_links = cache(links)

@@ -16,7 +16,6 @@ from idbench.experiments.study.statistics import BOUNDS
 from idbench.experiments.study.study import Study
 from idbench.identify import (
     Array,
-    Basis,
     Chain,
     Estimate,
     ExplicitModel,
@@ -40,19 +39,22 @@ from idbench.sim.trajectories import Reference
 MIN_NOISE = 1e-9  # Noise [rad, N m] that counts as none: the bound is then that of rounding
 
 
-def bounds_of(basis: Basis, simulated: Run, truth: Mapping[str, float]) -> dict[str, Array]:
-    """Return the least standard deviations of every parameter that the noise of encoders and torques allows, shape (run, p).
+def _known(study: Study, robot_model: RobotModel, simulated: Run) -> tuple[dict[str, float], dict[str, Array]]:
+    """Truth of a robot's parameters, and, if asked for, the least standard deviations that noise allows, shape (run, p).
 
-    What else is wrong in a scenario, such as cogging, is no part of them.
+    Noise is that of encoders and torques. What else is wrong in a scenario, such as cogging, is no part of them.
     """
-    scenario, n = simulated.scenario, basis.n
+    scenario, basis, n = simulated.scenario, robot_model.basis, robot_model.basis.n
+    truth = robot_model.truth(simulated.robots[0], scenario.friction)
+    if not study.bound:
+        return truth, {}
     noise = NoiseLevels(*(np.maximum(x, MIN_NOISE) for x in (scenario.torque.spread(n), scenario.encoder.spread(n))))
     X = np.array(list(truth.values()))
     found = {
         name: cramer_rao(basis, X, simulated.q, simulated.qd, scenario.fs, noise, reversals=reversals)
         for name, reversals in zip(BOUNDS, (False, True), strict=True)
     }
-    return {name: np.sqrt(np.diagonal(C, axis1=-2, axis2=-1)) for name, C in found.items()}
+    return truth, {name: np.sqrt(np.diagonal(C, axis1=-2, axis2=-1)) for name, C in found.items()}
 
 
 START = 5  # Stream of random numbers of where estimators begin
@@ -78,14 +80,7 @@ class Shard:
 def run_shard(study: Study, runs: range, *, progress: Progress | None = None) -> Shard:
     """Simulate and identify runs of one combination of the grid; a run that fails leaves its reason in its rows.
 
-    Parameters
-    ----------
-    study : Study
-        What to run.
-    runs : range
-        Numbers of the runs, all of one point of the grid.
-    progress : callable, optional
-        Receives the share that is done: the simulation and each method count alike.
+    `progress` receives the share that is done: the simulation and each method count alike.
     """
     shard = Shard()
     scenarios = {run: study.scenario_of(run) for run in runs}
@@ -132,12 +127,6 @@ def _groups(study: Study, scenarios: Mapping[int, Scenario], shard: Shard) -> It
         else:
             groups[len(motion.q)][run] = motion
     yield from groups.values()
-
-
-def _known(study: Study, robot_model: RobotModel, simulated: Run) -> tuple[dict[str, float], dict[str, Array]]:
-    """Return the truth of a robot's parameters, and the least errors that noise allows, if they are asked for."""
-    truth = robot_model.truth(simulated.robots[0], simulated.scenario.friction)
-    return truth, bounds_of(robot_model.basis, simulated, truth) if study.bound else {}
 
 
 def _simulate(

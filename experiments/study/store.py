@@ -140,12 +140,7 @@ class Store:
     def held(self) -> Iterator[None]:
         """Make the folder unless it is there, and hold it while the study is run.
 
-        Raises
-        ------
-        StudyError
-            If another process holds it, or another study has come into it.
-        ResultsError
-            If it cannot be written.
+        StudyError if another process holds it, or another study has come into it; ResultsError if it cannot be written.
         """
         try:
             (self.folder / "shards").mkdir(parents=True, exist_ok=True)

@@ -238,13 +238,7 @@ class Study:
         return found
 
     def scenario_of(self, run: int) -> Scenario:
-        """Return the scenario of a run by itself; the same run of the same study is the same, whatever runs beside it.
-
-        Raises
-        ------
-        StudyError
-            If the study has no such run.
-        """
+        """Return the scenario of a run by itself, the same whatever runs beside it; StudyError if the study has no such run."""
         if not 0 <= run < self.size:
             raise StudyError(f"run {run} does not exist: the study {self.name!r} has runs 0 to {self.size - 1}")
         point, number = divmod(run, self.seeds)

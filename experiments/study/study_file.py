@@ -1,6 +1,5 @@
 """Studies as TOML."""
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -21,13 +20,7 @@ def names() -> tuple[str, ...]:
 
 
 def load_study(name: str) -> Study:
-    """Return the study that ships as `name`, or that of a TOML file.
-
-    Raises
-    ------
-    StudyError
-        If there is none, it is not TOML, or what it says cannot be run.
-    """
+    """Return the study that ships as `name`, or that of a TOML file; StudyError if there is none, or it cannot be run."""
     if not name.endswith(".toml") and name not in names():
         hint = did_you_mean(name, names())
         raise StudyError(f"no study {name!r}{hint}; known: {', '.join(names())}, or give the path of a TOML file (.toml)")
@@ -56,11 +49,6 @@ def study_from(content: dict[str, Any], what: str) -> Study:
     except (ScenarioError, StudyError) as error:
         raise StudyError(f"{what}: {error}") from error
     return study
-
-
-def study_from_text(text: str) -> Study:
-    """Make a study from `Study.text`."""
-    return study_from(json.loads(text), "study")
 
 
 def _scenario(base: Any, changes: Any) -> dict[str, Any]:

@@ -2,8 +2,8 @@
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from math import isfinite
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,18 +12,19 @@ from rich.console import Console
 from rich.text import Text
 
 from idbench.experiments.errors import ResultsError
+from idbench.experiments.program import program
 from idbench.experiments.reports.figures import rendered
 from idbench.experiments.results.attempts import Attempts
 from idbench.experiments.results.folder import ResultsFolder
-from idbench.experiments.results.writing import write_summary
+from idbench.experiments.results.writing import finite, write_summary
 from idbench.experiments.study.answer import (
     grouped,
     headline,
+    in_words,
     method,
     percent,
     settings_of,
     short,
-    value,
     where,
 )
 from idbench.experiments.study.axis import FRICTION, Axis
@@ -34,7 +35,6 @@ from idbench.experiments.study.ratios import compares_models, interval, pair_of,
 from idbench.experiments.study.statistics import BOUNDS, Cell, cells
 from idbench.experiments.study.store import Store, arrays
 from idbench.experiments.study.study import Study
-from idbench.experiments.study.worst_runs import command, worst_runs
 from idbench.experiments.text import new_table, print_table
 from idbench.experiments.text import percent as signed
 
@@ -88,13 +88,13 @@ def families(study: Study, cells: Sequence[Cell]) -> dict[str, list[Cell]]:
     """Return the cells that differ only in the main axis and the model, by what they have in common."""
     main, groups = main_axis(study).field, dict[str, list[Cell]]()
     for cell in cells:
-        fixed = [f"{short(name)} {value(x)}" for name, x in cell.settings.items() if name != main]
+        fixed = [f"{short(name)} {in_words(x)}" for name, x in cell.settings.items() if name != main]
         groups.setdefault(", ".join([*fixed, f"chain {cell.names[0]}", cell.names[1]]), []).append(cell)
     return groups
 
 
 def _overview(cell: Cell) -> list[str]:
-    settings = [value(x) for x in cell.settings.values()]
+    settings = [in_words(x) for x in cell.settings.values()]
     head = [*settings, *cell.names, f"{cell.runs}", f"{cell.failed or ''}"]
     if not cell.runs:
         return [*head, *[""] * 7]
@@ -128,6 +128,38 @@ def _differences(cells: Sequence[Cell]) -> Iterator[list[str]]:
             yield [title, method(d.better, cells), method(d.worse, cells), f"{d.ratio:.3g}", f"{d.p:.1g}", f"{d.runs}"]
 
 
+WORST = 10  # Runs that are listed
+
+
+def worst_runs(cells: Sequence[Cell]) -> list[tuple[Cell, str, float, int]]:
+    """Return the identifications with the largest relative errors: cell, parameter, error, run.
+
+    The worst run of each combination and model comes first, so that not all are of one kind; each run is there once.
+    """
+    firsts, others = list[tuple[Cell, str, float, int]](), list[tuple[Cell, str, float, int]]()
+    for cell in cells:
+        p = np.nan_to_num(np.abs(cell.error)).argmax(axis=1)
+        own = [(cell, cell.parameters[j], float(cell.error[i, j]), int(cell.run[i])) for i, j in enumerate(p)]
+        own.sort(key=_by_size)
+        firsts += own[:1]
+        others += own[1:]
+    worst: dict[int, tuple[Cell, str, float, int]] = {}
+    for entry in [*sorted(firsts, key=_by_size), *sorted(others, key=_by_size)]:
+        worst.setdefault(entry[3], entry)
+    return list(worst.values())[:WORST]
+
+
+def _by_size(entry: tuple[Cell, str, float, int]) -> float:
+    return -abs(entry[2])
+
+
+def command(study: Study, folder: Path, cell: Cell, run: int) -> str:
+    """Command that makes a run again, identified as in a cell."""
+    number = next(i for i, found in enumerate(study.methods) if found.fits(*cell.names[:2], cell.settings))
+    chosen = f" --method {number}" if number else ""
+    return f"{program()} run --from {quote(str(folder))} --index {run}{chosen}"
+
+
 MOST_REASONS = 3  # Reasons of failures that are printed; the report has all
 
 
@@ -159,7 +191,7 @@ def print_study(page: Console, study: Study, found: Sequence[Cell]) -> None:
     columns = [*axes[1:], "identified by", "runs", "failed", "typical error", *least, "within 2 sigma", *often]
     grid = new_table(study.question, columns)
     for cell in found:
-        settings = [value(x) for x in settings_of(cell).values()] or [""]
+        settings = [in_words(x) for x in settings_of(cell).values()] or [""]
         numbers = f"{cell.runs}", f"{cell.failed or ''}"
         bounds = [percent(cell.typical_least(bound)) for bound in BOUNDS] if least else []
         errors = [percent(cell.typical), *bounds] if cell.runs else [""] * (1 + len(least))
@@ -227,5 +259,5 @@ def _cell(cell: Cell) -> dict[str, Any]:
             "paper_coverage": cell.coverage(cell.paper_sigma),
             **{f"{bound[1:]}_percent": 100 * cell.least(bound) for bound in BOUNDS},
         }
-        summary |= {name: [float(x) if isfinite(x) else None for x in values] for name, values in numbers.items()}
+        summary |= {name: [finite(x) for x in values] for name, values in numbers.items()}
     return summary

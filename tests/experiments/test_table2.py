@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from idbench.experiments.paper import attribution, table2
+from idbench.experiments.paper import attribution
 from idbench.experiments.paper.attribution import Attribution, imperfections
 from idbench.experiments.paper.table2 import PAPER, Table2
 from idbench.sim.drives import AveragedDrive
@@ -73,7 +73,7 @@ def test_it_is_printed_and_written(short, tmp_path, ran):
 
 def test_it_makes_the_papers_rows_on_the_motion_that_ships():
     """1600 rows each: two realizations of 800, four of 400; the scenario is checked before anything is simulated."""
-    table = Table2(load(table2.SCENARIO))
+    table = Table2(load("table2"))
     assert table.rest == 3.0
     assert sum(load("table1").trajectory.durations) == pytest.approx(40.0)
     assert {name: len(column.estimate) for name, column in PAPER.items()} == dict.fromkeys(PAPER, 8)

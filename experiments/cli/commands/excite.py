@@ -10,8 +10,7 @@ from idbench.experiments.cli.command import command_of, with_own_parts
 from idbench.experiments.cli.options.jobs import Excite
 from idbench.experiments.cli.saving import Files, saved, write_scenario
 from idbench.experiments.excite.excited import Excited
-from idbench.experiments.excite.job import designed, excited
-from idbench.experiments.excite.motion_file import write_motion
+from idbench.experiments.excite.job import designed, excited, write_motion
 from idbench.experiments.excite.sequence import MotionSequence
 from idbench.experiments.inputs import files_of
 from idbench.experiments.judgement.warnings import FILE, warnings_of_robot

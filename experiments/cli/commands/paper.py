@@ -12,11 +12,10 @@ from idbench.experiments.cli.commands.inner import doubt_window, recording_of, r
 from idbench.experiments.cli.options.jobs import SearchCommand, Table1Command, Table2Command
 from idbench.experiments.cli.saving import saved
 from idbench.experiments.errors import ExperimentError
-from idbench.experiments.paper.job import Searching, searched, table1_of, table2_of
-from idbench.experiments.paper.motions import Table1Motions
-from idbench.experiments.paper.motions_report import picture, print_motions
+from idbench.experiments.paper.job import Searching, searched, table1_of
+from idbench.experiments.paper.motions import Table1Motions, picture, print_motions
 from idbench.experiments.paper.table1 import print_table1
-from idbench.experiments.paper.table2 import print_table2
+from idbench.experiments.paper.table2 import Table2, print_table2
 from idbench.experiments.results.folder import ResultsFolder
 from idbench.experiments.results.page import Page, progress_of
 from idbench.experiments.results.writing import require_free, write_text
@@ -96,7 +95,7 @@ def table2(options: Table2Command) -> None:
         recording = recording_of(described, audience, options.inner) if watching.rerun else None
         with (
             progress_of("simulating") as progress,
-            closing(table2_of(options, progress, recording.watch if recording else None)) as table,
+            closing(Table2(described, progress, recording.watch if recording else None)) as table,
         ):
             print_table2(page, table)
             summary = table.summary()

@@ -1,6 +1,7 @@
 """What a study makes of its file: runs, seeds, methods; and what it refuses."""
 
 import itertools
+import json
 import re
 import tomllib
 from dataclasses import replace
@@ -10,7 +11,7 @@ import pytest
 
 from idbench.experiments.errors import StudyError
 from idbench.experiments.study.axis import Axis
-from idbench.experiments.study.study_file import load_study, names, study_from, study_from_text
+from idbench.experiments.study.study_file import load_study, names, study_from
 from idbench.identify import IirLowPass, NoMask
 from idbench.sim.drives import AveragedDrive
 
@@ -108,7 +109,7 @@ def test_shared_motion_is_the_scenarios(content):
 
 
 def test_text_and_toml_say_it_all(small):
-    again = study_from_text(small.text)
+    again = study_from(json.loads(small.text), "study")
     assert again == small
     assert again.fingerprint == small.fingerprint
     assert replace(small, seeds=8).fingerprint != small.fingerprint
