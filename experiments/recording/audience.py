@@ -21,8 +21,6 @@ GOODBYE = 10.0  # How long a viewer may take to take what is still on its way to
 DEAF = 6  # How often in a row a viewer may fail to take what is sent within half a second
 PORT = 9090  # Port of the web viewer
 
-LEAVING = "idbench-leaving"
-
 
 @dataclass(frozen=True)
 class Watching:
@@ -82,15 +80,7 @@ class Watching:
 
 
 class Audience:
-    """A viewer that watches; when it goes, one line says so, and the work goes on.
-
-    Parameters
-    ----------
-    url : str
-        Where it listens.
-    pace : float, optional
-        Simulated seconds in a second.
-    """
+    """A viewer that watches at `pace` simulated seconds in a second; when it goes, one line says so, and the work goes on."""
 
     def __init__(self, url: str, pace: float | None = None) -> None:
         self.url = url
@@ -128,7 +118,7 @@ class Audience:
 
     def leave(self, recording: "rr.RecordingStream") -> None:
         """Take leave of the viewer; one that hangs is left behind, with the thread that waits for it."""
-        thread = threading.Thread(target=recording.disconnect, name=LEAVING, daemon=True)
+        thread = threading.Thread(target=recording.disconnect, name="idbench-leaving", daemon=True)
         thread.start()
         thread.join(GOODBYE)
 

@@ -49,18 +49,8 @@ SIZE = 0.016  # Half the width of a symbol
 class Chart:
     """A chart: a frame with its axes, and what is drawn into it.
 
-    Widths and sizes are in points of the screen, which rerun takes from negative radii.
-
-    Parameters
-    ----------
-    stream : Stream
-        Where it goes.
-    path : str
-        Entity of which its parts are the children.
-    x, y : AbstractScale
-        Its axes.
-    width : float
-        That of its frame.
+    Its parts are the children of the entity `path`. Widths and sizes are in points of the screen, which rerun takes from
+    negative radii; but that of the frame is in its heights.
     """
 
     def __init__(self, stream: Stream, path: str, x: AbstractScale, y: AbstractScale, width: float = WIDE) -> None:
@@ -80,10 +70,10 @@ class Chart:
         self._texts("ticks_y", list(zip(beside, up, strict=True)), list(y.ticks.values()))
         self._texts("names", [(self._width / 2, HEIGHT + 0.24), (0.2, -0.09)], [x.name, y.name])
 
-    def dots(self, name: str, x: Array, y: Array, color: Color, size: float = 1.2) -> None:
-        """Draw values as dots, each `size` points in radius; those beyond the axes are left out."""
+    def dots(self, name: str, x: Array, y: Array, color: Color) -> None:
+        """Draw values as dots; those beyond the axes are left out."""
         where = self._where(x, y)[self._x.holds(x) & self._y.holds(y)]
-        dots = rr.Points2D(where, colors=[color], radii=[-size], show_labels=False, draw_order=DOT_ORDER)
+        dots = rr.Points2D(where, colors=[color], radii=[-1.2], show_labels=False, draw_order=DOT_ORDER)
         self._stream.keep(f"{self._path}/dots/{part(name)}", dots)
 
     def line(self, name: str, x: Array, y: Array, color: Color, width: float = 1.2, *, listed: bool = True) -> None:

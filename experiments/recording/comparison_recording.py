@@ -23,7 +23,7 @@ from idbench.experiments.recording.columns import NANOSECONDS, part, seconds
 from idbench.experiments.recording.compared import Compared, difference, differences, estimates, named_runs, shift_of
 from idbench.experiments.recording.folder import BASE, INNER, files
 from idbench.experiments.recording.identification_layer import Layer
-from idbench.experiments.recording.identification_recording import ROLES, RunRecording, recording_id
+from idbench.experiments.recording.identification_recording import RunRecording, recording_id
 from idbench.experiments.recording.lanes import about
 from idbench.experiments.recording.layouts import tabs
 from idbench.experiments.recording.motion_layer import Base
@@ -69,7 +69,7 @@ def finish_table2(recording: RunRecording, table: Table2) -> list[tuple[str, Str
     for form in next(iter(table.attribution.values())):
         _send_causes(stream, table, form)
     stream.page("table2", _markdown(table))
-    recording.base.finish(about(table.scenario.name, table.scenario.origin, ROLES))
+    recording.base.finish(about(table.scenario.name, table.scenario.origin))
     return streams
 
 

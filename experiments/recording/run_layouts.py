@@ -258,3 +258,7 @@ def _known_units() -> dict[str, str]:
     each = [parameter for block in blocks for parameter in block.parameters(2)]
     every = (*each, *scara().parameters)
     return {x: unit for x, (_, unit) in KINDS.items()} | {_letters(p.name): p.unit for p in every}
+
+
+RUN_LAYOUTS = (overview, torques, friction, drive, filters, noise, excitation, parameters, iterations)
+"""Those of runs and logs, in the order of their tabs."""
