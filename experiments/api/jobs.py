@@ -166,8 +166,8 @@ def _unheard(*_: object) -> None:
 
 
 def _asked(request: type[Any], where: str, keys: Mapping[str, Any], taken: Sequence[str] = (), **files: Any) -> Any:
-    every = [each for value in files.values() for each in several(value)]
-    if wrong := [each for each in every if not isinstance(each, str | Path)]:
+    given = {name: each for name, value in files.items() if (each := several(value))}
+    if wrong := [each for paths in given.values() for each in paths if not isinstance(each, str | Path)]:
         raise ExperimentError(f"{where}: {wrong[0]!r:.60} is no file: give the names of files")
-    given = {name: tuple(map(Path, several(value))) for name, value in files.items()}
-    return request_from(request, {**named(keys), **{name: value for name, value in given.items() if value}}, where, taken=taken)
+    paths = {name: tuple(map(Path, each)) for name, each in given.items()}
+    return request_from(request, named(keys) | paths, where, taken=taken)
