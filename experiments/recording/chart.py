@@ -1,6 +1,6 @@
 """Charts of one quantity over another, drawn into a 2D view: what rerun plots by itself is over time."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Literal
 
 import numpy as np
@@ -39,6 +39,8 @@ _TURNS: dict[Symbol, Sequence[tuple[float, float]]] = {
     "circle": [(np.cos(a), np.sin(a)) for a in np.linspace(0, 2 * np.pi, 13)],
 }
 SYMBOLS: tuple[Symbol, ...] = tuple(_TURNS)
+
+MAX_ROWS = 13  # Parameters of a chart in rows
 
 LETTER, GAP = 0.5, 1.4  # Width of a letter of a legend in a row, and of the room between its entries, in heights of its view
 LETTER_BESIDE = 0.016  # Half the width of a letter beside the upright axis, of a chart that is some 220 points high
@@ -131,3 +133,9 @@ def send_keys(stream: Stream, path: str, entries: Mapping[str, Color]) -> None:
     strips = [np.array([[at, -0.5]] * 2) for at in np.cumsum(widths) - widths / 2]
     lines = rr.LineStrips2D(strips, colors=list(entries.values()), radii=[0.0], labels=list(entries), show_labels=True)
     stream.keep(path, lines)
+
+
+def in_charts(names: Sequence[str], most: int) -> Iterator[tuple[str, npt.NDArray[np.intp]]]:
+    """Yield the name of each chart of `most` parameters, and their places."""
+    for k, members in enumerate(np.array_split(np.arange(len(names)), -(-len(names) // most))):
+        yield f"{k}_{part(names[members[0]])}_to_{part(names[members[-1]])}", members
