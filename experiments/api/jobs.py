@@ -29,10 +29,8 @@ from idbench.experiments.study.store import Store, arrays
 from idbench.experiments.study.study import Study
 from idbench.experiments.study.study_file import load_study
 from idbench.experiments.study.study_results import print_study, summary_of
-from idbench.experiments.text import printed
+from idbench.experiments.text import PRINTED, printed
 from idbench.identify import BLOCKS
-
-WIDTH = 160  # Characters of a line
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +64,7 @@ class StudyTable:
         return printed(lambda console: print_study(console, self.study, self.cells))
 
     def _repr_html_(self) -> str:
-        console = Console(file=StringIO(), width=WIDTH, record=True)
+        console = Console(file=StringIO(), width=PRINTED, record=True)
         print_study(console, self.study, self.cells)
         return console.export_html(inline_styles=True, code_format="<pre>{code}</pre>")
 

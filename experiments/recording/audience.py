@@ -4,7 +4,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -74,7 +74,11 @@ class Watching:
         elif self.serve:
             with served(PORT if self.port is None else self.port) as url:
                 yield Audience(url, self.pace)
-                _until_interrupted()
+                sys.stderr.write("idbench: done; served until Ctrl-C\n")
+                with suppress(KeyboardInterrupt):
+                    while True:
+                        time.sleep(3600)
+                sys.stderr.write("\n")
         else:
             yield None
 
@@ -121,12 +125,3 @@ class Audience:
         thread = threading.Thread(target=recording.disconnect, name="idbench-leaving", daemon=True)
         thread.start()
         thread.join(GOODBYE)
-
-
-def _until_interrupted() -> None:
-    sys.stderr.write("idbench: done; served until Ctrl-C\n")
-    try:
-        while True:
-            time.sleep(3600)
-    except KeyboardInterrupt:
-        sys.stderr.write("\n")

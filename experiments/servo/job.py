@@ -13,7 +13,7 @@ from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.causes import suspect_summary
 from idbench.experiments.identification.robot_model import absolute
 from idbench.experiments.requests.jobs import ServoRequest
-from idbench.experiments.servo.identification import AUTO, Servos, lacks_summary, summary_of
+from idbench.experiments.servo.identification import AUTO, Servos, summary_of
 from idbench.experiments.servo.joints import Identified
 from idbench.experiments.servo.servo_text import remedy_of, servo_table, verdict_lines, warnings_of
 from idbench.identify import Array, IdentificationError, SettingError
@@ -21,7 +21,7 @@ from idbench.identify.files.servo_file import ServoFile
 from idbench.identify.files.servo_log import ServoColumns, ordered, read_servo_log
 from idbench.identify.judge.suspect import Suspect
 from idbench.identify.servo import SERVO_FRICTIONS, ServoFit
-from idbench.identify.servo.choice import ServoFrictionChoice
+from idbench.identify.servo.choice import ServoFrictionChoice, residuals_by_state
 from idbench.identify.servo.fit import require_possible
 from idbench.identify.servo.law import EXACT, TimeSteps
 from idbench.identify.servo.mistakes import mistake_of
@@ -109,10 +109,11 @@ class ServosFit:
     def parameters(self) -> dict[str, Any]:
         """Summary of the fits."""
         laws = {joint: {"errors": choice.errors, "p": choice.p} for joint, choice in self.choices.items()}
+        lacks = {joint: [lack._asdict() for lack in residuals_by_state(fit)] for joint, fit in self.fits.items()}
         return {
             **({"laws": laws} if laws else {}),
             "joints": {joint: summary_of(fit) for joint, fit in self.fits.items()},
-            "lack_of_fit": {joint: lacks_summary(fit) for joint, fit in self.fits.items()},
+            "lack_of_fit": {j: {"friction": fit.friction, "residuals": lacks[j]} for j, fit in self.fits.items()},
             "diagnosis": [
                 suspect_summary(mistake, [joint], mistake.unit, remedy_of(mistake)) for joint, mistake in self.mistakes.items()
             ],
