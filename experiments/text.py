@@ -28,6 +28,7 @@ JOINTS: tuple[Color, ...] = (
 )
 """Colours of the joints' curves, none of which is a model's; the first two are those of the SCARA's links."""
 
+PRINTED = 160  # Characters of a line in Python
 TICKS = 6  # Values that have room beside an axis
 NICE = (1.0, 2.0, 2.5, 3.0, 4.0, 5.0, 10.0)  # Steps between the values beside an axis, times a power of ten
 ROUNDING = 1e-9  # Share of a step by which a value beside an axis is off as a number
@@ -245,8 +246,8 @@ def error_percentage(share: float) -> str:
     return f"{share:.2g} %" if share < 10 else f"{share:.0f} %" if share < 1000 else "more than 1000 %"
 
 
-def printed(show: Callable[[Console], object], width: int = 160) -> str:
-    """Text as printed on a console of so many characters."""
+def printed(show: Callable[[Console], object]) -> str:
+    """Text as printed on a console of `PRINTED` characters."""
     file = StringIO()
-    show(Console(file=file, width=width))
+    show(Console(file=file, width=PRINTED))
     return file.getvalue()

@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from idbench.experiments.api.logs import given_log, motion_log
+from idbench.experiments.api.logs import given_log
 from idbench.experiments.api.results import Identification, SimulatedRun
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.friction_laws import AUTO
@@ -95,7 +95,11 @@ def read_log(
     asked = request_from(LogRequest, table, "read_log", taken=taken)
     if sought := delay_method(asked.torque_delay):
         raise ExperimentError(f"torque_delay: the robot is needed for it: idbench.fit(..., torque_delay={sought!r})")
-    return motion_log(file_of(Path(path)), asked, robot)
+    file = file_of(Path(path))
+    found = read(file, asked, robot)
+    if len(found.logs) > 1:
+        raise ExperimentError(f"{file} has {len(found.logs)} pieces with gaps between them: give the file itself to the fit")
+    return replace(found.logs[0], joints=found.columns.joints if robot is None else robot.robot.joints)
 
 
 def fit(
@@ -193,10 +197,9 @@ def named(keys: Mapping[str, Any]) -> dict[str, Any]:
 
 def _names(key: str, value: Any) -> Any:
     names = tuple(map(PARTS[key].name_of, several(value)))
-    for word in (
-        word for name, each in zip(names, several(value), strict=True) if name == each for word in re.split(r"[\s=+]", name)
-    ):
-        PARTS[key].require_one(word)
+    for name, each in zip(names, several(value), strict=True):
+        for word in re.split(r"[\s=+]", name) if name == each else ():
+            PARTS[key].require_one(word)
     if key == "friction" and len(names) > 1 and not any("=" in name or name == AUTO for name in names):
         return ("+".join(names),)  # laws of all joints, one beside the other
     return names if isinstance(value, list | tuple) else names[0]
@@ -228,12 +231,9 @@ def _require_logs(logs: Sequence[Any], held_out: Sequence[Any], keys: Mapping[st
         raise ExperimentError("fit: name a log, or several of one fit")
     if wrong := [each for each in (*logs, *held_out) if not isinstance(each, AnyLog)]:
         raise ExperimentError(f"fit: {wrong[0]!r:.60} is no log: give a MotionLog, as read_log returns it, or a file")
-    reading = {
-        *request_keys(ColumnOptions),
-        "torque",
-        "unwrap",
-        *(() if delay_method(keys.get("torque_delay")) else ("torque_delay",)),
-    }
+    reading = {*request_keys(ColumnOptions), "torque", "unwrap"}
+    if not delay_method(keys.get("torque_delay")):
+        reading.add("torque_delay")
     if not _files(logs) and (given := [key for key in keys if key in reading]):
         raise ExperimentError(f"fit: {', '.join(given)} is how a log is read, and this one is: give it to read_log")
 
@@ -253,14 +253,12 @@ def _require_truth(truth: Mapping[str, float] | None, model: RobotModel) -> None
 
 def _with_keys(model: RobotModel, asked: jobs.IdentifyRequest, table: Mapping[str, Any]) -> RobotModel:
     """Return a robot with the parameters that keywords ask for beside its own."""
-    for group, name in ((Parameters, "parameters"), (MountingOptions, "mounting")):
-        given = {key: getattr(getattr(asked, name), key) for key in request_keys(group) if key in table}
-        if given and name == "mounting":
-            raise ExperimentError(f"fit: {', '.join(given)} is what the robot is loaded with: give it to load_robot")
-        if "add" in given:  # beside its own
-            given["add"] = (*model.asked.add, *given["add"])
-        model = replace(model, asked=replace(model.asked, **given)) if given else model
-    return model
+    if mounting := [key for key in request_keys(MountingOptions) if key in table]:
+        raise ExperimentError(f"fit: {', '.join(mounting)} is what the robot is loaded with: give it to load_robot")
+    given = {key: getattr(asked.parameters, key) for key in request_keys(Parameters) if key in table}
+    if "add" in given:  # beside its own
+        given["add"] = (*model.asked.add, *given["add"])
+    return replace(model, asked=replace(model.asked, **given)) if given else model
 
 
 def _read(logs: Sequence[AnyLog], asked: jobs.IdentifyRequest, model: RobotModel) -> list[ReadLog]:

@@ -29,11 +29,9 @@ from idbench.experiments.study.store import Store, arrays
 from idbench.experiments.study.study import Study
 from idbench.experiments.study.study_file import load_study
 from idbench.experiments.study.study_results import print_study, summary_of
-from idbench.experiments.text import printed
+from idbench.experiments.text import PRINTED, printed
 from idbench.identify import BLOCKS
 from idbench.sim.scenario.scenario_file import load
-
-WIDTH = 160  # Characters of a line
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +65,7 @@ class StudyTable:
         return printed(lambda console: print_study(console, self.study, self.cells))
 
     def _repr_html_(self) -> str:
-        console = Console(file=StringIO(), width=WIDTH, record=True)
+        console = Console(file=StringIO(), width=PRINTED, record=True)
         print_study(console, self.study, self.cells)
         return console.export_html(inline_styles=True, code_format="<pre>{code}</pre>")
 
@@ -167,8 +165,8 @@ def _unheard(*_: object) -> None:
 
 
 def _asked(request: type[Any], where: str, keys: Mapping[str, Any], taken: Sequence[str] = (), **files: Any) -> Any:
-    every = [each for value in files.values() for each in several(value)]
-    if wrong := [each for each in every if not isinstance(each, str | Path)]:
+    given = {name: each for name, value in files.items() if (each := several(value))}
+    if wrong := [each for paths in given.values() for each in paths if not isinstance(each, str | Path)]:
         raise ExperimentError(f"{where}: {wrong[0]!r:.60} is no file: give the names of files")
-    given = {name: tuple(map(Path, several(value))) for name, value in files.items()}
-    return request_from(request, {**named(keys), **{name: value for name, value in given.items() if value}}, where, taken=taken)
+    paths = {name: tuple(map(Path, each)) for name, each in given.items()}
+    return request_from(request, named(keys) | paths, where, taken=taken)

@@ -4,20 +4,10 @@ from dataclasses import replace
 from pathlib import Path
 
 from idbench.experiments.errors import ExperimentError
-from idbench.experiments.identification.reading import ReadLog, read
+from idbench.experiments.identification.reading import ReadLog
 from idbench.experiments.identification.robot_model import RobotModel
-from idbench.experiments.requests.shared import LogRequest
 from idbench.identify import LogError, MotionLog
 from idbench.identify.data.log_columns import LogColumns
-
-
-def motion_log(path: Path, options: LogRequest, robot_model: RobotModel | None = None) -> MotionLog:
-    """Return the log of a file, with the names of its joints; raise ExperimentError if it has several pieces."""
-    found = read(path, options, robot_model)
-    if len(found.logs) > 1:
-        raise ExperimentError(f"{path} has {len(found.logs)} pieces with gaps between them: give the file itself to the fit")
-    names = found.columns.joints if robot_model is None else robot_model.robot.joints
-    return replace(found.logs[0], joints=names)
 
 
 def given_log(name: str, log: MotionLog, robot_model: RobotModel) -> ReadLog:

@@ -4,7 +4,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -20,8 +20,6 @@ if TYPE_CHECKING:
 GOODBYE = 10.0  # How long a viewer may take to take what is still on its way to it, at the end [s]
 DEAF = 6  # How often in a row a viewer may fail to take what is sent within half a second
 PORT = 9090  # Port of the web viewer
-
-LEAVING = "idbench-leaving"
 
 
 @dataclass(frozen=True)
@@ -76,21 +74,17 @@ class Watching:
         elif self.serve:
             with served(PORT if self.port is None else self.port) as url:
                 yield Audience(url, self.pace)
-                _until_interrupted()
+                sys.stderr.write("idbench: done; served until Ctrl-C\n")
+                with suppress(KeyboardInterrupt):
+                    while True:
+                        time.sleep(3600)
+                sys.stderr.write("\n")
         else:
             yield None
 
 
 class Audience:
-    """A viewer that watches; when it goes, one line says so, and the work goes on.
-
-    Parameters
-    ----------
-    url : str
-        Where it listens.
-    pace : float, optional
-        Simulated seconds in a second.
-    """
+    """A viewer that watches at `pace` simulated seconds in a second; when it goes, one line says so, and the work goes on."""
 
     def __init__(self, url: str, pace: float | None = None) -> None:
         self.url = url
@@ -128,15 +122,6 @@ class Audience:
 
     def leave(self, recording: "rr.RecordingStream") -> None:
         """Take leave of the viewer; one that hangs is left behind, with the thread that waits for it."""
-        thread = threading.Thread(target=recording.disconnect, name=LEAVING, daemon=True)
+        thread = threading.Thread(target=recording.disconnect, name="idbench-leaving", daemon=True)
         thread.start()
         thread.join(GOODBYE)
-
-
-def _until_interrupted() -> None:
-    sys.stderr.write("idbench: done; served until Ctrl-C\n")
-    try:
-        while True:
-            time.sleep(3600)
-    except KeyboardInterrupt:
-        sys.stderr.write("\n")

@@ -1,6 +1,6 @@
 """Charts of one quantity over another, drawn into a 2D view: what rerun plots by itself is over time."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Literal
 
 import numpy as np
@@ -40,6 +40,8 @@ _TURNS: dict[Symbol, Sequence[tuple[float, float]]] = {
 }
 SYMBOLS: tuple[Symbol, ...] = tuple(_TURNS)
 
+MAX_ROWS = 13  # Parameters of a chart in rows
+
 LETTER, GAP = 0.5, 1.4  # Width of a letter of a legend in a row, and of the room between its entries, in heights of its view
 LETTER_BESIDE = 0.016  # Half the width of a letter beside the upright axis, of a chart that is some 220 points high
 RAISE = 0.05  # How far texts are raised: the viewer writes them below where they belong
@@ -49,18 +51,8 @@ SIZE = 0.016  # Half the width of a symbol
 class Chart:
     """A chart: a frame with its axes, and what is drawn into it.
 
-    Widths and sizes are in points of the screen, which rerun takes from negative radii.
-
-    Parameters
-    ----------
-    stream : Stream
-        Where it goes.
-    path : str
-        Entity of which its parts are the children.
-    x, y : AbstractScale
-        Its axes.
-    width : float
-        That of its frame.
+    Its parts are the children of the entity `path`. Widths and sizes are in points of the screen, which rerun takes from
+    negative radii; but that of the frame is in its heights.
     """
 
     def __init__(self, stream: Stream, path: str, x: AbstractScale, y: AbstractScale, width: float = WIDE) -> None:
@@ -80,10 +72,10 @@ class Chart:
         self._texts("ticks_y", list(zip(beside, up, strict=True)), list(y.ticks.values()))
         self._texts("names", [(self._width / 2, HEIGHT + 0.24), (0.2, -0.09)], [x.name, y.name])
 
-    def dots(self, name: str, x: Array, y: Array, color: Color, size: float = 1.2) -> None:
-        """Draw values as dots, each `size` points in radius; those beyond the axes are left out."""
+    def dots(self, name: str, x: Array, y: Array, color: Color) -> None:
+        """Draw values as dots; those beyond the axes are left out."""
         where = self._where(x, y)[self._x.holds(x) & self._y.holds(y)]
-        dots = rr.Points2D(where, colors=[color], radii=[-size], show_labels=False, draw_order=DOT_ORDER)
+        dots = rr.Points2D(where, colors=[color], radii=[-1.2], show_labels=False, draw_order=DOT_ORDER)
         self._stream.keep(f"{self._path}/dots/{part(name)}", dots)
 
     def line(self, name: str, x: Array, y: Array, color: Color, width: float = 1.2, *, listed: bool = True) -> None:
@@ -141,3 +133,9 @@ def send_keys(stream: Stream, path: str, entries: Mapping[str, Color]) -> None:
     strips = [np.array([[at, -0.5]] * 2) for at in np.cumsum(widths) - widths / 2]
     lines = rr.LineStrips2D(strips, colors=list(entries.values()), radii=[0.0], labels=list(entries), show_labels=True)
     stream.keep(path, lines)
+
+
+def in_charts(names: Sequence[str], most: int) -> Iterator[tuple[str, npt.NDArray[np.intp]]]:
+    """Yield the name of each chart of `most` parameters, and their places."""
+    for k, members in enumerate(np.array_split(np.arange(len(names)), -(-len(names) // most))):
+        yield f"{k}_{part(names[members[0]])}_to_{part(names[members[-1]])}", members

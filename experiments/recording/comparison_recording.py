@@ -1,6 +1,6 @@
 """The recording of a comparison: several runs laid over each other, estimates and what differs beside them."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from collections.abc import Set as AbstractSet
 from math import isnan
 from pathlib import Path
@@ -23,7 +23,7 @@ from idbench.experiments.recording.columns import NANOSECONDS, part, seconds
 from idbench.experiments.recording.compared import Compared, difference, differences, estimates, named_runs, shift_of
 from idbench.experiments.recording.folder import BASE, INNER, files
 from idbench.experiments.recording.identification_layer import Layer
-from idbench.experiments.recording.identification_recording import ROLES, RunRecording, recording_id
+from idbench.experiments.recording.identification_recording import RunRecording, recording_id
 from idbench.experiments.recording.lanes import about
 from idbench.experiments.recording.layouts import tabs
 from idbench.experiments.recording.motion_layer import Base
@@ -67,9 +67,11 @@ def finish_table2(recording: RunRecording, table: Table2) -> list[tuple[str, Str
     streams = recording.end(run)
     _send_processings(stream, table)
     for form in next(iter(table.attribution.values())):
-        _send_causes(stream, table, form)
+        rows = ([cause, *map(_emphasized, errors[form])] for cause, errors in table.attribution.items())
+        title = f"Error [%] of each parameter by each cause alone, **{form}** model"
+        stream.page(f"attribution/{form}", markdown(title, list(table.truth), rows))
     stream.page("table2", _markdown(table))
-    recording.base.finish(about(table.scenario.name, table.scenario.origin, ROLES))
+    recording.base.finish(about(table.scenario.name, table.scenario.origin))
     return streams
 
 
@@ -86,13 +88,6 @@ def _send_processings(stream: Stream, table: Table2) -> None:
         for symbol, (form, error) in zip(SYMBOLS, found.items(), strict=False):
             chart.marks(form, error, np.arange(float(len(names))), FORMS[form], symbol)
             chart.list_entry(form, FORMS[form])
-
-
-def _send_causes(stream: Stream, table: Table2, form: str) -> None:
-    """Send the error of every parameter by each cause alone, as a table; large ones in bold."""
-    rows = ([cause, *(_emphasized(e) for e in errors[form])] for cause, errors in table.attribution.items())
-    text = markdown(f"Error [%] of each parameter by each cause alone, **{form}** model", list(table.truth), rows)
-    stream.page(f"attribution/{form}", text)
 
 
 def _emphasized(error_percent: float) -> str:
@@ -127,25 +122,22 @@ def compare(folders: Sequence[Path], tab: str, out: Path) -> None:
     ExperimentError
         If they cannot be compared, or the recording has no such layout.
     """
-    runs, stream = named_runs(folders), Stream(f"comparison-{'-'.join(part(folder.name) for folder in folders)}")
+    first, *others = runs = named_runs(folders)
+    stream = Stream(f"comparison-{'-'.join(part(folder.name) for folder in folders)}")
     notes = [differences(runs)]
-    for number, run in enumerate(runs):
-        shift = shift_of(runs[0].log, run.log) if number else 0.0
-        if number:
-            notes.append(_note(runs[0], run, shift))
+    _copy(stream, first, 0, 0.0)
+    for number, run in enumerate(others, 1):
+        shift = shift_of(first.log, run.log)
+        moved = f"{run.name} is moved by {shift:+.4g} s to lie over {first.name}." if shift else ""
+        apart = f"{run.name} and {first.name} do not make the same motion: they are shown as they are, without differences."
+        notes.append(apart if shift is None else moved)
         _copy(stream, run, number, shift or 0.0)
-        if number and shift is not None:
-            _send_differences(stream, runs[0], run, shift)
+        if shift is not None:
+            _send_differences(stream, first, run, shift)
     stream.page("comparison", "\n\n".join([estimates(runs), *notes]))
     stream.keep_sizes()
     stream.arrange(tabs(stream.paths, tab))
     stream.write(out)
-
-
-def _note(first: Compared, run: Compared, shift: float | None) -> str:
-    if shift is None:
-        return f"{run.name} and {first.name} do not make the same motion: they are shown as they are, without differences."
-    return f"{run.name} is moved by {shift:+.4g} s to lie over {first.name}." if shift else ""
 
 
 def _copy(stream: Stream, run: Compared, number: int, shift: float) -> None:
@@ -155,19 +147,14 @@ def _copy(stream: Stream, run: Compared, number: int, shift: float) -> None:
         raise ResultsError(f"there is no recording in {run.folder}: run it without --no-rerun")
     labels = [path for path in paths if path.name not in (BASE, INNER)]
     copied = set[str]()
-    for path in reversed(paths):
-        for chunk in _chunks(path):
+    for reader in map(RrdReader, reversed(paths)):
+        chunks = [chunk for entry in reader.recordings() for chunk in reader.stream(store=entry).to_chunks()]
+        for chunk in chunks:
             place = _place(chunk.entity_path.strip("/"), run.name, number, len(labels) > 1)
             if place is not None:
                 stream.add(_moved(chunk, shift).with_entity_path(f"/{place}"), place)
                 copied.add(place)
     _restyle(stream, run, number, copied)
-
-
-def _chunks(path: Path) -> Iterator[Chunk]:
-    reader = RrdReader(path)
-    for entry in reader.recordings():
-        yield from reader.stream(store=entry).to_chunks()
 
 
 def _place(path: str, name: str, number: int, several: bool) -> str | None:

@@ -1,15 +1,12 @@
 """The recording of a designed motion: the arm along it, limits in use, and which stretch excites which parameter."""
 
-from collections.abc import Iterator, Sequence
-
 import numpy as np
-import numpy.typing as npt
 
 from idbench.experiments.excite.excitation import REST
 from idbench.experiments.excite.excited import STRETCHES, Excited
 from idbench.experiments.excite.limit_use import FS
 from idbench.experiments.recording.audience import Audience
-from idbench.experiments.recording.chart import SQUARE, Chart
+from idbench.experiments.recording.chart import MAX_ROWS, SQUARE, Chart, in_charts
 from idbench.experiments.recording.columns import part, seconds
 from idbench.experiments.recording.folder import BASE
 from idbench.experiments.recording.identification_recording import recording_id
@@ -26,7 +23,6 @@ DARK, BRIGHT = np.array([32.0, 32.0, 36.0]), np.array([90.0, 200.0, 120.0])
 """Colours of cells: of a stretch without information, and of the most informative one."""
 
 LEVELS = 8  # Colours that can be distinguished: an entity each, where one for each cell would make a large recording
-MAX_ROWS = 13  # Parameters of a chart
 NOTABLE = 0.2  # Largest share of a limit below which it is not shown: it is in nobody's way
 
 
@@ -64,7 +60,7 @@ def _send_sigmas(stream: Stream, found: Excited) -> None:
     names = found.design.robot_model.basis.names
     others = np.sort(found.sigmas[1:] / found.median, axis=0)
     x = decades("sigma relative to the median random motion", others, found.sigma / found.median)
-    for at, members in _parts(names):
+    for at, members in in_charts(names, MAX_ROWS):
         chart = Chart(stream, f"excited/sigma/{at}", x, listed("", [names[p] for p in members]), SQUARE)
         y = np.arange(float(len(members)))
         chart.intervals("random", others[0, members], others[-1, members], y, GREY, 3.0)
@@ -80,7 +76,7 @@ def _send_told(stream: Stream, found: Excited) -> None:
     duration = found.design.duration
     begin = len(found.ways[0].q) / FS + REST
     middles = begin + (np.arange(STRETCHES) + 0.5) * duration / STRETCHES
-    for at, members in _parts(names):
+    for at, members in in_charts(names, MAX_ROWS):
         x = linear("time [s]", begin, begin + duration)
         chart = Chart(stream, f"excited/told/{at}", x, listed("", [names[p] for p in members]))
         strength = np.clip(shares[:, members] / shares[:, members].max(axis=0), 0.0, 1.0)
@@ -90,9 +86,3 @@ def _send_told(stream: Stream, found: Excited) -> None:
             begins, ends = (middles[stretch] + half * duration / STRETCHES for half in (-0.46, 0.46))
             color: Color = [int(v) for v in DARK + (BRIGHT - DARK) * k / (LEVELS - 1)]
             chart.intervals(f"level {k}", begins, ends, row[which], color, 5.0)
-
-
-def _parts(names: Sequence[str]) -> Iterator[tuple[str, npt.NDArray[np.intp]]]:
-    """Yield the name of each chart and the parameters in it."""
-    for k, members in enumerate(np.array_split(np.arange(len(names)), -(-len(names) // MAX_ROWS))):
-        yield f"{k}_{part(names[members[0]])}_to_{part(names[members[-1]])}", members

@@ -25,41 +25,6 @@ from idbench.identify import (
     smoothed_motion,
 )
 
-
-def send_smoothed(stream: Stream, at: str, fit: JointFit, joints: Sequence[str]) -> None:
-    """Send the smoothed motion with its band of one sigma, and how far measured positions and their differences are from it.
-
-    Parameters
-    ----------
-    stream : Stream
-        Where to.
-    at : str
-        Path of the identification.
-    fit : JointFit
-        Motion and parameters of one log.
-    joints : sequence of str
-        Their names.
-    """
-    log, motion = fit.logs[0].log, smoothed_motion(fit)
-    q = log.q[np.rint(motion.t * log.fs).astype(np.intp)]
-    measured = {"q": q, "qd": np.gradient(q, 1 / log.fs, axis=0)}
-    times = [seconds(motion.t)]
-    for name, sigma in (("q", motion.sigma_q), ("qd", motion.sigma_qd), ("qdd", motion.sigma_qdd)):
-        for k, (joint, color) in enumerate(zip(joints, joint_colors(len(joints)), strict=True)):
-            value = getattr(motion, name)[:, k]
-            _send_band(stream, f"{at}/smoothed/{name}/{joint}", motion.t, value, sigma[:, k], color)
-            if name in measured:
-                left = measured[name][:, k] - value
-                path = f"{at}/measured_less_smoothed/{name}/{joint}"
-                stream.curve(path, times, left, "measured - smoothed", GREY, 1.0)
-                _send_band(stream, f"{at}/smoothed_band/{name}/{joint}", motion.t, 0 * left, sigma[:, k], color)
-
-
-def _send_band(stream: Stream, path: str, t: Array, values: Array, sigma: Array, color: Sequence[int]) -> None:
-    stream.keep(path, rr.Measurements.from_fields(names=["smoothed"], colors=[color], widths=[1.5]))
-    stream.send(path, [seconds(t)], rr.Measurements.columns(values=values, variances=sigma**2))
-
-
 EVERY = 0.5  # Time between the instants of recursive estimates [s]
 WIDE = 7.0  # Width of what a mistake explains, on which the residual is drawn
 
@@ -68,21 +33,7 @@ WIDEST = 0.5
 
 
 class Layer:
-    """What the identification of one log adds to its recording.
-
-    Parameters
-    ----------
-    name : str
-        Recording id of the motion.
-    fit : Fit
-        The identification of one log.
-    joints : sequence of str
-        Names of the joints.
-    known : set of str
-        Entities that the recording has already.
-    audience : Audience, optional
-        Who watches.
-    """
+    """What the identification of one log adds to the recording `name`, which has the entities `known` already."""
 
     def __init__(self, name: str, fit: Fit, joints: Sequence[str], known: set[str], audience: Audience | None = None) -> None:
         self.stream = Stream(name, audience, layer=True)
@@ -108,7 +59,7 @@ class Layer:
             self._columns(at, form, estimate, names)
             self._running(at, form, estimate, color)
             for fit in estimate.fits.values():
-                send_smoothed(self.stream, self._at, fit, self._joints)
+                self._smoothed(fit)
         self._mistake()
         self._truth()
         ResidualCharts(self.stream, self._at, self._fit, self._joints, self._shade).send()
@@ -141,6 +92,26 @@ class Layer:
         lanes, weight = Lanes(self.stream, log.fs), self._signals.weight
         for joint, of_joint in zip(self._joints, weight, strict=True):
             lanes.send(f"{self._at}/mask/{joint}", log.t, mask_states(of_joint))
+
+    def _smoothed(self, fit: JointFit) -> None:
+        """Send the smoothed motion with its band of one sigma, and how far measured positions and their differences are off."""
+        log, motion = fit.logs[0].log, smoothed_motion(fit)
+        q = log.q[np.rint(motion.t * log.fs).astype(np.intp)]
+        measured = {"q": q, "qd": np.gradient(q, 1 / log.fs, axis=0)}
+        for name, sigma in (("q", motion.sigma_q), ("qd", motion.sigma_qd), ("qdd", motion.sigma_qdd)):
+            for k, (joint, color) in enumerate(zip(self._joints, joint_colors(len(self._joints)), strict=True)):
+                value = getattr(motion, name)[:, k]
+                self._band(f"smoothed/{name}/{joint}", motion.t, value, sigma[:, k], color)
+                if name in measured:
+                    left = measured[name][:, k] - value
+                    path = f"{self._at}/measured_less_smoothed/{name}/{joint}"
+                    self.stream.curve(path, [seconds(motion.t)], left, "measured - smoothed", GREY, 1.0)
+                    self._band(f"smoothed_band/{name}/{joint}", motion.t, 0 * left, sigma[:, k], color)
+
+    def _band(self, path: str, t: Array, values: Array, sigma: Array, color: Color) -> None:
+        path = f"{self._at}/{path}"
+        self.stream.keep(path, rr.Measurements.from_fields(names=["smoothed"], colors=[color], widths=[1.5]))
+        self.stream.send(path, [seconds(t)], rr.Measurements.columns(values=values, variances=sigma**2))
 
     def _columns(self, at: str, form: str, estimate: Estimate, names: Sequence[str]) -> None:
         """Send the columns of W, scaled to unit length."""

@@ -11,7 +11,7 @@ from idbench.experiments.recording.audience import Audience
 from idbench.experiments.recording.columns import parts
 from idbench.experiments.recording.folder import BASE, INNER, files, known, layer_file, rearranged
 from idbench.experiments.recording.identification_layer import Layer
-from idbench.experiments.recording.lanes import about
+from idbench.experiments.recording.lanes import ROLES, about
 from idbench.experiments.recording.live_layer import LiveIdentification
 from idbench.experiments.recording.motion_layer import Base
 from idbench.experiments.recording.stream import Stream
@@ -23,24 +23,14 @@ from idbench.sim.engine.watch import Watch
 from idbench.sim.scenario.scenario import Scenario
 from idbench.sim.scenario.scenario_file import to_toml
 
-ROLES = ("true", "planned", "measured")
-
 UNWATCHED = 10.0  # Length of the stretches of a run that nobody watches [s]: what is not recorded yet takes memory
 
 
 class RunRecording:
     """The recording of a scenario, which grows while it is simulated.
 
-    Parameters
-    ----------
-    scenario : Scenario
-        What is simulated.
-    audience : Audience, optional
-        Who watches.
-    window : tuple of float, optional
-        From when to when signals inside the loop are shown at their full rate [s].
-    robot_model : RobotModel, optional
-        What is identified of the robot while it moves, for who watches; all of it by default.
+    In `window` [s] signals inside the loop are shown at their full rate; `robot_model` is what is identified of the robot while
+    it moves, for who watches; all of it by default.
     """
 
     def __init__(
@@ -53,7 +43,7 @@ class RunRecording:
         self._audience, written = audience, to_toml(scenario)
         robot, fs = scenario.real_robot, scenario.fs
         planned = scenario.trajectory.sample(robot, fs)
-        self.base = Base(recording_id(scenario.name, written.encode()), robot, fs, ROLES, planned.qd, audience)
+        self.base = Base(recording_id(scenario.name, written.encode()), robot, fs, tuple(ROLES), planned.qd, audience)
         self.base.stream.describe(scenario=written, seed=str(scenario.seed), fs_hz=f"{scenario.fs:g}")
         if audience:  # so that the view holds the whole motion from the beginning
             self.base.arm.trace(planned.q)
@@ -72,7 +62,7 @@ class RunRecording:
         streams = self.end(ran.run)
         if ran.rejection is not None:
             self.base.also("torque/rejection", ran.rejection.rejected)
-        self.base.finish(about(ran.scenario.name, ran.scenario.origin, ROLES))
+        self.base.finish(about(ran.scenario.name, ran.scenario.origin))
         if is_long([ran.run.alone()]):  # of which no rows are kept
             return streams
         there = set().union(*(stream.paths for _, stream in streams))

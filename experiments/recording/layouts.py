@@ -7,26 +7,15 @@ import rerun.blueprint as rrb
 
 from idbench.experiments.errors import ResultsError
 from idbench.experiments.recording.chart import NARROW, SQUARE
-from idbench.experiments.recording.run_layouts import (
-    drive,
-    excitation,
-    filters,
-    friction,
-    iterations,
-    noise,
-    overview,
-    parameters,
-    residuals,
-    torques,
-)
+from idbench.experiments.recording.run_layouts import RUN_LAYOUTS, residuals
 from idbench.experiments.recording.views import (
+    ACROSS,
     Part,
     Shelf,
     arm,
     charts,
     column,
     grid,
-    height,
     keys,
     plot,
     side_by_side,
@@ -49,8 +38,7 @@ def table2(shelf: Shelf) -> Part:
         plot(shelf, "true - commanded [N m]", "torque/disturbance"),
     )
     left = column(side_by_side("twin", arm(shelf), signals, shares=[2, 3]), text(shelf, "table2"), shares=[3, 5])
-    steps = column(*found)
-    return side_by_side("table2", left, steps, causes, shares=[7, 4, 7])
+    return side_by_side("table2", left, column(*found), causes, shares=[7, 4, 7])
 
 
 def compare(shelf: Shelf) -> Part:
@@ -76,9 +64,13 @@ def excited(shelf: Shelf) -> Part:
     told = charts(shelf, "which stretch excites which parameter: bright is most", "excited/told/*")
     if not told:
         return None
-    limits = column(*(plot(shelf, _limit(path), f"limits/{path}") for path in sorted(shelf.parts("limits/*"))))
+    limits = [
+        plot(shelf, f"{path.partition('_')[2].replace('_', ' ')} [% of its limit]", f"limits/{path}")
+        for path in sorted(shelf.parts("limits/*"))
+    ]
     left = column(arm(shelf), text(shelf, "about"), shares=[5, 3])
-    middle = column(plot(shelf, "q [rad]", "q/designed"), plot(shelf, "qd [rad/s]", "qd/designed"), limits, shares=[1, 1, 4])
+    motion = plot(shelf, "q [rad]", "q/designed"), plot(shelf, "qd [rad/s]", "qd/designed")
+    middle = column(*motion, column(*limits), shares=[1, 1, 4])
     names = [path.partition("_")[2].replace("_", " ") for path in sorted(shelf.parts("excited/told/*/frame", -2))]
     pairs = zip(names, sigmas or [None] * len(told), told, strict=True)
     each = [column(*pair, shares=[1, 1], name=name) for name, *pair in pairs]
@@ -102,11 +94,6 @@ def servos(shelf: Shelf) -> Part:
     return side_by_side("servos", column(arm(shelf), text(shelf, "about"), shares=[4, 1]), shown, shares=[1, 2])
 
 
-def _limit(path: str) -> str:
-    """Return the title of a plot of limits/2_acceleration."""
-    return f"{path.partition('_')[2].replace('_', ' ')} [% of its limit]"
-
-
 def study(shelf: Shelf) -> Part:
     """Return a study: errors over the values of each axis, all parameters together and one by one, and the answer."""
     pages = [_over_axis(shelf, axis) for axis in shelf.parts("study/*/typical/frame", 1)]
@@ -126,23 +113,8 @@ def _over_axis(shelf: Shelf, axis: str) -> Part:
     return column(*typical, shown, shares=[2, 3], name=axis)
 
 
-LAYOUTS: dict[str, Callable[[Shelf], Part]] = {
-    "study": study,
-    "table2": table2,
-    "compare": compare,
-    "excited": excited,
-    "servos": servos,
-    "overview": overview,
-    "torques": torques,
-    "friction": friction,
-    "drive": drive,
-    "filters": filters,
-    "noise": noise,
-    "excitation": excitation,
-    "parameters": parameters,
-    "iterations": iterations,
-}
-"""Layouts by what they are for; a recording opens with the first for which it has something to show."""
+LAYOUTS: tuple[Callable[[Shelf], Part], ...] = (study, table2, compare, excited, servos, *RUN_LAYOUTS)
+"""Layouts, named after what they are for; a recording opens with the first for which it has something to show."""
 
 
 def tabs(paths: AbstractSet[str], active: str = "") -> rrb.Blueprint:
@@ -154,11 +126,11 @@ def tabs(paths: AbstractSet[str], active: str = "") -> rrb.Blueprint:
         If `active` is none of them.
     """
     shelf = Shelf(paths)
-    made = {name: part for name, make in LAYOUTS.items() if (part := make(shelf)) is not None}
+    made = {make.__name__: part for make in LAYOUTS if (part := make(shelf)) is not None}
     time = rrb.TimePanel(state="collapsed", timeline="sim_time")
     if active and active not in made:
         raise ResultsError(f"this recording has no tab {active!r}; it has {', '.join(made)}")
     number = list(made).index(active) if active else 0
-    high = height(shelf, "legend/*")
+    high = -(-len(shelf.of("legend/*")) // ACROSS)  # rows of legends
     pages = [column(keys(shelf, "legend/*"), part, shares=[high, HIGHER], name=name) or part for name, part in made.items()]
     return rrb.Blueprint(rrb.Tabs(*pages, active_tab=number), time, collapse_panels=True)

@@ -32,23 +32,7 @@ LABEL = "so-far"
 
 
 class LiveIdentification:
-    """What can be said of a log that grows.
-
-    Parameters
-    ----------
-    stream : Stream
-        Where it is shown.
-    robot_model : RobotModel
-        The robot.
-    chain : str
-        Name of the signal processing.
-    channel : TorqueChannel
-        What the torque means.
-    fs : float
-        Sampling frequency [Hz].
-    joints : sequence of str
-        Names of the joints, as parts of paths.
-    """
+    """What can be said of a log that grows, sampled at `fs` [Hz], shown in a stream; `joints` are parts of paths."""
 
     def __init__(
         self, stream: Stream, robot_model: RobotModel, chain: str, channel: TorqueChannel, fs: float, joints: Sequence[str]

@@ -9,10 +9,10 @@ import rerun as rr
 from idbench.experiments.recording.audience import Audience
 from idbench.experiments.recording.chart import send_keys
 from idbench.experiments.recording.columns import POSES, Times, part, parts, poses, seconds, shown, time_columns
-from idbench.experiments.recording.lanes import Lanes, joint_states
+from idbench.experiments.recording.lanes import ROLES, Lanes, joint_states
 from idbench.experiments.recording.layouts import tabs
 from idbench.experiments.recording.stream import Stream
-from idbench.experiments.text import GREY, MEASURED, PLANNED, WIDTHS, Color, joint_colors, kind_colors
+from idbench.experiments.text import GREY, WIDTHS, Color, joint_colors, kind_colors
 from idbench.identify import Array, MotionLog
 from idbench.identify.signals.masks import slow_speed
 from idbench.sim.drives.drive import BetweenEdges
@@ -23,22 +23,9 @@ from idbench.sim.robot.scene import Mover, SceneShape, shapes
 if TYPE_CHECKING:
     from idbench.experiments.recording.live_layer import LiveIdentification
 
-ROLES: dict[str, Color | None] = {"true": None, "measured": MEASURED, "planned": PLANNED}
-"""Arms that may be shown, and the colour of those that are drawn as wires around the first."""
-
 
 class Arm:
-    """The arms of a recording.
-
-    Parameters
-    ----------
-    stream : Stream
-        Where they go.
-    robot : Robot
-        What they look like.
-    roles : tuple of str
-        Those of ROLES that are shown; the first is drawn solid.
-    """
+    """The arms of a recording, of these `ROLES`; the first is drawn solid."""
 
     def __init__(self, stream: Stream, robot: Robot, roles: tuple[str, ...]) -> None:
         self._stream = stream
@@ -56,7 +43,7 @@ class Arm:
                 if role == roles[0] or shape.body in self._moving:
                     path = f"world/{role}/{part(shape.body)}/{part(shape.name)}"
                     where = rr.Transform3D(translation=shape.position, quaternion=rr.Quaternion(xyzw=shape.quaternion))
-                    stream.keep(path, _drawn(shape, None if role == roles[0] else ROLES[role]), where)
+                    stream.keep(path, _drawn(shape, None if role == roles[0] else ROLES[role][0]), where)
 
     def move(self, times: Times, where: Mapping[str, Array]) -> None:
         """Send where arms are, by their role, at positions [rad] of shape (time, joint)."""
@@ -107,22 +94,10 @@ ELECTRIC = ("reference", "current", "voltage", "duty", "emf")  # Signals of a dr
 
 
 class Base:
-    """A recording that grows with the motion that it shows.
+    """A recording that grows with the motion that it shows, sampled at `fs` [Hz].
 
-    Parameters
-    ----------
-    name : str
-        Recording id.
-    robot : Robot
-        What moves.
-    fs : float
-        Sampling frequency [Hz].
-    roles : tuple of str
-        Arms that are drawn, of `ROLES`.
-    qd : Array, shape (time, joint)
-        Velocities of the whole motion, planned or measured [rad/s]: they say which are slow.
-    audience : Audience, optional
-        Who watches.
+    `roles` are the arms that are drawn, of `ROLES`; `qd` are the velocities of the whole motion, planned or measured [rad/s],
+    shape (time, joint): they say which are slow.
     """
 
     def __init__(
@@ -162,18 +137,10 @@ class Base:
     def add(
         self, first: int, signals: Mapping[str, Array], poses: Mapping[str, Array], qd: Array, limited: Array | None = None
     ) -> None:
-        """Send what happened from sample `first` on.
+        """Send what happened from sample `first` on, arrays of shape (time, joint).
 
-        Parameters
-        ----------
-        first : int
-            Number of the first sample.
-        signals, poses : mapping of str to Array, shape (time, joint)
-            Curves by their path, and positions [rad] of the arms by their role.
-        qd : Array, shape (time, joint)
-            Velocities [rad/s] by which joints count as at rest.
-        limited : Array, shape (time, joint), optional
-            Share of each sample for which a drive was at a limit of its.
+        `signals` are curves by their path, `poses` positions [rad] of the arms by their role, `qd` velocities [rad/s] by which
+        joints count as at rest, `limited` the share of each sample for which a drive was at a limit of its.
         """
         t = (first + np.arange(len(qd))) / self._fs
         kept, seen = self._kept(first, t), shown(first, len(qd), self._fs, POSES)
@@ -260,7 +227,6 @@ class Base:
 def _signals(stretch: WatchedStretch) -> dict[str, Array]:
     """Return the curves of a stretch, by path."""
     planned = stretch.reference
-    gap = {} if stretch.gap is None else {"gear/gap": stretch.gap}
     asked = {"torque/command": stretch.command, "torque/disturbance": stretch.tau - stretch.command}
     return {
         "q/planned": planned.q,
@@ -274,5 +240,5 @@ def _signals(stretch: WatchedStretch) -> dict[str, Array]:
         "torque/true": stretch.tau,
         "torque/log": stretch.logged,
         **({} if stretch.by_position else asked),
-        **gap,
+        **({} if stretch.gap is None else {"gear/gap": stretch.gap}),
     }

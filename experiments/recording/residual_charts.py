@@ -3,14 +3,13 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from math import ceil
 
 import numpy as np
 import numpy.typing as npt
 
 from idbench.experiments.identification.fit import Fit
 from idbench.experiments.judgement.warnings import WEAK
-from idbench.experiments.recording.chart import NARROW, SQUARE, SYMBOLS, Chart
+from idbench.experiments.recording.chart import MAX_ROWS, NARROW, SQUARE, SYMBOLS, Chart, in_charts
 from idbench.experiments.recording.columns import part
 from idbench.experiments.recording.scales import Linear, Signed, decades, linear, listed, named
 from idbench.experiments.recording.stream import Stream
@@ -40,15 +39,13 @@ def send_iterations(stream: Stream, at: str, fit: Fit) -> None:
         high = max(float(np.nanmax(np.abs(off))), 10 * LINEAR_UP_TO)
         scale = Signed("away from the last [sigma]", -1.3 * high, 1.3 * high, LINEAR_UP_TO)
         axis = named("round", list(map(str, range(len(path)))))
-        for k, members in enumerate(np.array_split(np.arange(len(names)), ceil(len(names) / len(JOINTS)))):  # a colour each
-            place = f"{at}/iterations/{model}/{k}_{part(names[members[0]])}_to_{part(names[members[-1]])}"
-            chart = Chart(stream, place, axis, scale, NARROW)
+        for place, members in in_charts(names, len(JOINTS)):  # a colour each
+            chart = Chart(stream, f"{at}/iterations/{model}/{place}", axis, scale, NARROW)
             for color, p in zip(JOINTS, members, strict=False):
                 chart.line(names[p], rounds, off[:, p], color)
                 chart.marks(f"{names[p]} ", rounds, off[:, p], color)
 
 
-MAX_ROWS = 13  # Parameters of a single chart; more have a chart for each joint
 ASIDE = 0.22  # How far the models of a parameter stand apart, of its room
 
 

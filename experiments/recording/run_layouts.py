@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from functools import cache
+from itertools import groupby
 
 from idbench.experiments.recording.chart import NARROW, SQUARE
 from idbench.experiments.recording.views import (
@@ -52,8 +53,7 @@ def overview(shelf: Shelf) -> Part:
 
 def torques(shelf: Shelf) -> Part:
     """Return torques measured and predicted, and residuals, two joints in a row; of arms with many joints."""
-    rows = _rows(shelf)
-    if len(rows) <= FEW + 1:  # which the overview shows well
+    if len(rows := _rows(shelf)) <= FEW + 1:  # which the overview shows well
         return None
     pairs = zip(_fits(shelf, rows), residuals(shelf), strict=True)
     return grid("torques", [column(fit, left, shares=[3, 2]) for fit, left in pairs], 2)
@@ -182,10 +182,8 @@ def _estimates(shelf: Shelf, names: Sequence[str]) -> Part:
     """Views of the iterations, of many parameters in a tab for each joint."""
     if len(names) <= ESTIMATES:
         return grid("estimates", [_estimate(shelf, name) for name in names], 2)
-    by_joint: dict[int, list[str]] = {}
-    for name in names:
-        by_joint.setdefault(_number(name), []).append(name)
-    pages = [grid(f"joint {j}", [_estimate(shelf, name) for name in of_joint], 3) for j, of_joint in by_joint.items()]
+    by_joint = groupby(names, _number)  # names are in the order of their joints
+    pages = [grid(f"joint {j}", [_estimate(shelf, name) for name in of_joint], 3) for j, of_joint in by_joint]
     return tabbed(pages, "over time")
 
 
@@ -258,3 +256,7 @@ def _known_units() -> dict[str, str]:
     each = [parameter for block in blocks for parameter in block.parameters(2)]
     every = (*each, *scara().parameters)
     return {x: unit for x, (_, unit) in KINDS.items()} | {_letters(p.name): p.unit for p in every}
+
+
+RUN_LAYOUTS = (overview, torques, friction, drive, filters, noise, excitation, parameters, iterations)
+"""Those of runs and logs, in the order of their tabs."""

@@ -22,20 +22,9 @@ COMMANDED = [200, 160, 60]  # Colour of commands
 def record_servos(
     robot: Robot, name: str, log: ServoColumns, simulated: Mapping[str, Array], audience: Audience | None = None
 ) -> list[tuple[str, Stream]]:
-    """Return the stream of the recording, by the name of its file.
+    """Return the stream of the recording of a log, by the name of its file.
 
-    Parameters
-    ----------
-    robot : Robot
-        What moves.
-    name : str
-        Of the log.
-    log : ServoColumns
-        Commands and positions.
-    simulated : mapping of str to Array, shape (time,)
-        Positions of the joints with an estimate, from commands alone [rad], by joint.
-    audience : Audience, optional
-        Who watches.
+    `simulated` are the positions of the joints with an estimate, from commands alone [rad], by joint, shape (time,) each.
     """
     _, qd, _ = smoothed(log.t, log.q)
     fs = 1 / float(np.median(np.diff(log.t)))

@@ -26,14 +26,7 @@ class Stream:
     What goes to the file is kept in memory until it is written whole: a viewer that has gone, or a full disk, then costs
     nothing but itself. Chunks are made once and sent to both.
 
-    Parameters
-    ----------
-    name : str
-        Recording id: layers of the same name belong to one recording.
-    audience : Audience, optional
-        Who watches.
-    layer : bool
-        Whether it adds to a recording that is there already.
+    Layers of the same `name` belong to one recording; a `layer` adds to one that is there already.
     """
 
     def __init__(self, name: str, audience: Audience | None = None, *, layer: bool = False) -> None:
@@ -43,16 +36,17 @@ class Stream:
         self._draft = False
         self._drafted = set[str]()
         self._squares = dict[str, tuple[int, Array]]()
-        self._file = rr.RecordingStream(APPLICATION, recording_id=name, send_properties=not layer)
-        self._file.set_log_time_enabled(False)
+        self._file = self._recording(layer)
         self._bytes = rr.binary_stream(self._file)
-        self._live = self._connected(audience, layer) if audience and audience.watching else None
+        self._live = None
+        if audience and audience.watching:
+            self._live = self._recording(layer)
+            self._live.set_sinks(rr.GrpcSink(audience.url))
 
-    def _connected(self, audience: Audience, layer: bool) -> rr.RecordingStream:
-        live = rr.RecordingStream(APPLICATION, recording_id=self.name, send_properties=not layer)
-        live.set_log_time_enabled(False)
-        live.set_sinks(rr.GrpcSink(audience.url))
-        return live
+    def _recording(self, layer: bool) -> rr.RecordingStream:
+        made = rr.RecordingStream(APPLICATION, recording_id=self.name, send_properties=not layer)
+        made.set_log_time_enabled(False)
+        return made
 
     @property
     def shown(self) -> set[str]:

@@ -84,13 +84,10 @@ class AxisCharts:
 
     @property
     def _legend(self) -> Mapping[str, Color]:
-        model = self._models[0]
-        alone = self._alone
-        ways = {
-            f"{_SIGNS[self._symbol(way)]} {' '.join(way)}": self._color((*way, model)) if alone else GREY for way in self._ways
-        }
-        models = {} if alone else {model: FORMS.get(model, GREY) for model in self._models}
-        return models | (ways if len(ways) > 1 else {})
+        signs = {way: f"{_SIGNS[self._symbol(way)]} {' '.join(way)}" for way in self._ways if len(self._ways) > 1}
+        if self._alone:
+            return {sign: self._color((*way, self._models[0])) for way, sign in signs.items()}
+        return {model: FORMS.get(model, GREY) for model in self._models} | dict.fromkeys(signs.values(), GREY)
 
     @property
     def _alone(self) -> bool:
@@ -167,17 +164,7 @@ REST = 10.0  # The same, as a multiple of what the last drawing took: all runs a
 
 
 class StudyRecording:
-    """The recording of a study: drawn again and again while it runs, and kept when it has ended.
-
-    Parameters
-    ----------
-    study : Study
-        What is run.
-    folder : Path
-        Where it is kept.
-    audience : Audience, optional
-        Who watches.
-    """
+    """The recording of a study kept in a folder: drawn again and again while it runs, and kept when it has ended."""
 
     def __init__(self, study: Study, folder: Path, audience: Audience | None = None) -> None:
         self._study = study

@@ -16,13 +16,7 @@ Part = rrb.Container | rrb.View | None
 
 
 class Shelf:
-    """The entities of a recording, by what they are.
-
-    Parameters
-    ----------
-    paths : set of str
-        All entities.
-    """
+    """The entities of a recording, of which `paths` are all, by what they are."""
 
     def __init__(self, paths: AbstractSet[str]) -> None:
         named = [path.strip("/") for path in paths]
@@ -44,12 +38,12 @@ class Shelf:
 
     def of(self, *patterns: str) -> list[str]:
         """Return the entities that match one of the patterns, in which * stands for one part of a path."""
-        return [path for pattern in patterns for path in self._matching(pattern.split("/"))]
-
-    def _matching(self, pattern: Sequence[str]) -> list[str]:
-        fixed = [(at, part) for at, part in enumerate(pattern[:-1]) if part != "*"]
-        same = self._ending.get((len(pattern), pattern[-1]), [])
-        return [path for path, parts in same if all(parts[at] == part for at, part in fixed)]
+        found = list[str]()
+        for pattern in (pattern.split("/") for pattern in patterns):
+            fixed = [(at, part) for at, part in enumerate(pattern[:-1]) if part != "*"]
+            same = self._ending.get((len(pattern), pattern[-1]), [])
+            found += [path for path, parts in same if all(parts[at] == part for at, part in fixed)]
+        return found
 
     def rms(self, paths: Iterable[str]) -> str:
         """Size of curves for a title: the viewer's axes may have no number but 0."""
@@ -97,20 +91,9 @@ def lanes(shelf: Shelf, name: str, *patterns: str) -> Part:
 
 
 def charts(shelf: Shelf, name: str, pattern: str, width: float = WIDE, words: float = 0.0) -> list[Part]:
-    """Return a view of each chart, titled with its parts of the path in braces.
+    """Return a view of each chart, its frame of a `width`, titled with parts of its path: {1} for the second one and so on.
 
-    Parameters
-    ----------
-    shelf : Shelf
-        Where they are.
-    name : str
-        Title, with {1} for the second part of the path and so on.
-    pattern : str
-        Paths of the charts.
-    width : float
-        That of their frames.
-    words : float
-        Room that names beside the upright axis need more than numbers do, in heights of the frame.
+    `words` is the room that names beside the upright axis need more than numbers do, in heights of the frame.
     """
     views = list[Part]()
     for path in (frame.removesuffix("/frame") for frame in shelf.of(f"{pattern}/frame")):
@@ -126,19 +109,13 @@ def keys(shelf: Shelf, *patterns: str) -> Part:
     return rrb.Grid(*rows, grid_columns=ACROSS) if len(rows) > 1 else next(iter(rows), None)
 
 
-def height(shelf: Shelf, *patterns: str) -> int:
-    """Number of rows that legends take."""
-    return -(-len(shelf.of(*patterns)) // ACROSS)
-
-
 def text(shelf: Shelf, *patterns: str) -> Part:
     """Return the texts, one behind the other, if there are any."""
-    found = [rrb.TextDocumentView(origin=f"/{path}", name=_title(path)) for path in shelf.of(*patterns)]
+    titles = {
+        path: path.split("/")[1] if path.startswith(("identify/", "attribution/")) else path for path in shelf.of(*patterns)
+    }
+    found = [rrb.TextDocumentView(origin=f"/{path}", name=title) for path, title in titles.items()]
     return rrb.Tabs(*found, active_tab=len(found) - 1, name="texts") if len(found) > 1 else next(iter(found), None)
-
-
-def _title(path: str) -> str:
-    return path.split("/")[1] if path.startswith(("identify/", "attribution/")) else path
 
 
 def arm(shelf: Shelf) -> Part:

@@ -14,17 +14,14 @@ ROUNDING = 1e-12  # Torques below this share of the total are rounding
 
 def largest_torques(robot: Robot, motion: Reference) -> Mapping[str, Array]:
     """Return the largest torques along a motion: of every cause, of all together, and of the motor [N m], shape (joint,)."""
-    q = motion.q
-    qd = motion.qd
-    qdd = motion.qdd
-    still = np.zeros_like(q)
-    gravity = inverse_dynamics(robot, q, still, still)
-    damping = robot.model.dof_damping * qd
+    still = np.zeros_like(motion.q)
+    gravity = inverse_dynamics(robot, motion.q, still, still)
+    damping = robot.model.dof_damping * motion.qd
     parts = {  # shape (time, joint)
         "gravity": gravity,
-        "inertia": inverse_dynamics(robot, q, still, qdd) - gravity,
-        "velocity": inverse_dynamics(robot, q, qd, still) - gravity - damping,
-        "friction": damping + coulomb_torque(robot, qd),
+        "inertia": inverse_dynamics(robot, motion.q, still, motion.qdd) - gravity,
+        "velocity": inverse_dynamics(robot, motion.q, motion.qd, still) - gravity - damping,
+        "friction": damping + coulomb_torque(robot, motion.qd),
     }
     found = {name: np.abs(part).max(axis=0) for name, part in parts.items()}
     total = np.abs(np.sum(list(parts.values()), axis=0)).max(axis=0)

@@ -8,6 +8,7 @@ from math import isfinite
 import numpy as np
 
 from idbench.experiments.identification.fit import Fit
+from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.judgement.warnings import FLAGS, doubtful, used
 from idbench.experiments.text import WORTHLESS, number, percent, relative, with_unit
 from idbench.identify import Estimate
@@ -135,3 +136,9 @@ def explained(share: Array) -> str:
     known = 100 * share[np.isfinite(share)]
     each = [f"{max(x, 0):.3f}" for x in (known.min(), known.max())] if known.size else []
     return f"{' to '.join(dict.fromkeys(each))} %" if each else "nothing"
+
+
+def all_units(robot_model: RobotModel) -> tuple[str, str]:
+    """Units of the torques and of the positions of all joints, each once: slides may stand beside hinges."""
+    forces, ways = zip(*map(robot_model.units, range(robot_model.robot.n)), strict=True)
+    return ", ".join(dict.fromkeys(forces)), ", ".join(dict.fromkeys(ways))

@@ -21,9 +21,7 @@ from idbench.sim.scenario.scenario_file import to_toml
 
 def print_excited(console: Console, found: Excited) -> None:
     """Print the predicted sigma of every parameter beside random motions, and how limits are used."""
-    d = found.design
-    title = f"{d.robot_model.robot.name}: {d.kind}, {d.duration:g} s" + (f" x {d.repeat}" if d.repeat > 1 else "")
-    _print_sigmas(console, found, title)
+    _print_sigmas(console, found)
     _print_limits(console, found)
     for line in lines(found):
         console.print(Text(line), soft_wrap=True)
@@ -55,8 +53,9 @@ def _below(ratio: float) -> str:
     return f"{100 * (1 - ratio):.0f} % below" if ratio <= 1 else f"{100 * (ratio - 1):.0f} % above"
 
 
-def _print_sigmas(console: Console, found: Excited, title: str) -> None:
+def _print_sigmas(console: Console, found: Excited) -> None:
     d = found.design
+    title = f"{d.robot_model.robot.name}: {d.kind}, {d.duration:g} s" + (f" x {d.repeat}" if d.repeat > 1 else "")
     heads = ["X", "sigma", "%sigma", "of brisk\ntorque %", "random\nmedian", "random\nbest"]
     grid = new_table("", [*heads, *(["earlier\nlogs"] if found.earlier is not None else [])])
     brisk = 100 * brisk_shares(d.robot_model.tree, d.robot_model.basis, d.X, found.sigma)
@@ -64,13 +63,9 @@ def _print_sigmas(console: Console, found: Excited, title: str) -> None:
         share = 100 * found.sigma[i] / abs(d.X[i]) if d.X[i] else np.inf
         percent = (percentage(share) or f">{WORTHLESS:g}") if d.X[i] else "-"
         own = [number(d.X[i]), f"{found.sigma[i]:.2g}", percent, f"{brisk[i]:.2g}"]
-        others = [_sigma(x[i]) for x in (found.median, found.best, found.earlier) if x is not None]
-        grid.add_row(name, *own, *others)
+        known = (x[i] for x in (found.median, found.best, found.earlier) if x is not None)
+        grid.add_row(name, *own, *(f"{x:.2g}" if isfinite(x) else "-" for x in known))
     print_titled(console, f"{title}: predicted sigma", grid)
-
-
-def _sigma(x: float) -> str:
-    return f"{x:.2g}" if isfinite(x) else "-"
 
 
 def _print_limits(console: Console, found: Excited) -> None:
@@ -119,7 +114,7 @@ def report(found: Excited, command: str) -> str:
             (joint, [(f"{100 * share[j]:.0f} %", share[j] > BINDING) for share in found.use.largest.values()])
             for j, joint in enumerate(found.use.joints)
         ],
-        rows=list(_rows(found)),
+        rows=_rows(found),
         earlier=found.earlier is not None,
         command=command,
         toml=to_toml(found.scenario),
@@ -127,18 +122,13 @@ def report(found: Excited, command: str) -> str:
 
 
 def _rows(found: Excited) -> list[list[str]]:
-    d = found.design
-    others = [x for x in (found.median, found.best, found.earlier) if x is not None]
-    return [
-        [
-            name,
-            number(d.X[i]),
-            f"{found.sigma[i]:.2g}",
-            percentage(100 * found.sigma[i] / abs(d.X[i])) if d.X[i] else "",
-            *(f"{x[i]:.2g}" if np.isfinite(x[i]) else "" for x in others),
-        ]
-        for i, name in enumerate(d.robot_model.basis.names)
-    ]
+    X = found.design.X
+    rows = []
+    for i, name in enumerate(found.design.robot_model.basis.names):
+        share = percentage(100 * found.sigma[i] / abs(X[i])) if X[i] else ""
+        others = (f"{x[i]:.2g}" if isfinite(x[i]) else "" for x in (found.median, found.best, found.earlier) if x is not None)
+        rows.append([name, number(X[i]), f"{found.sigma[i]:.2g}", share, *others])
+    return rows
 
 
 def _sigma_figure(found: Excited) -> str:

@@ -10,6 +10,7 @@ from jinja2 import Environment
 from idbench.experiments.identification.causes import Cause
 from idbench.experiments.identification.fit import Fit
 from idbench.experiments.judgement.held_out import HeldOut
+from idbench.experiments.reports.estimates import all_units
 from idbench.experiments.reports.friction_curves import FRICTIONS, WHOLE, FrictionCurves, residual_instants, spectra
 from idbench.experiments.reports.panels import Panel, PanelAxis, figure
 from idbench.experiments.text import model_color, percentage
@@ -45,7 +46,7 @@ def torques_figure(one: HeldOut) -> str:
             predicted = rows.predicted(one.fit.estimates[model].X)
             panel.line(rows.time[own], np.where(rows.valid[own], predicted[own], np.nan), color_of(model), 1.0, model)
         panels.append(panel)
-    return figure(panels, 1.5, "time [s]", f"torque [{_units(one.fit)[0]}]")
+    return figure(panels, 1.5, "time [s]", f"torque [{all_units(one.fit.robot_model)[0]}]")
 
 
 def residuals_figure(one: HeldOut) -> str:
@@ -57,7 +58,7 @@ def residuals_figure(one: HeldOut) -> str:
         own, panel = rows.group == j, Panel(joint)
         panel.line(rows.time[own], np.where(rows.valid[own], residual[own], np.nan), color_of(model), 0.8)
         panels.append(panel)
-    return figure(panels, 1.35, "time [s]", f"residual [{_units(one.fit)[0]}]")
+    return figure(panels, 1.35, "time [s]", f"residual [{all_units(one.fit.robot_model)[0]}]")
 
 
 def causes_figure(fit: Fit) -> str:
@@ -75,7 +76,7 @@ def causes_figure(fit: Fit) -> str:
         for values, color, label in ((residual, "#999999", "residual of the fit"), (explained, color_of("power"), "explained")):
             panel.line(time, np.where(rows.valid[own], values[own], np.nan), color, 1.2, label)
         panels.append(panel)
-    return figure(panels, 1.6, "time [s]", f"[{_units(fit)[0]}]")
+    return figure(panels, 1.6, "time [s]", f"[{all_units(fit.robot_model)[0]}]")
 
 
 def _most_explained(rows: Rows, cause: Cause) -> tuple[npt.NDArray[np.bool_], Array]:
@@ -106,8 +107,8 @@ def friction_figure(fit: Fit) -> str:
             panel.line(speeds, np.where(inside, friction, np.nan), color_of("explicit"), 1.6, labels[0])
             panel.line(speeds, np.where(inside, np.nan, friction), color_of("power"), 1.6, labels[1], "2 3")
         panels.append(panel)
-    force, velocity = _units(fit)
-    return figure(panels, 1.6, f"velocity [{velocity}]", f"friction [{force}]")
+    force, ways = all_units(fit.robot_model)
+    return figure(panels, 1.6, f"velocity [{ways.replace(',', '/s,')}/s]", f"friction [{force}]")
 
 
 def spectra_figure(fit: Fit) -> str:
@@ -127,12 +128,6 @@ def spectra_figure(fit: Fit) -> str:
             panel.line(np.array([cutoff, cutoff]), np.array([top * 1e-5, top * 3]), "#cccccc")
         panels.append(panel)
     return figure(panels, 1.6, "frequency [Hz]")
-
-
-def _units(fit: Fit) -> tuple[str, str]:
-    """Return the units of the torques and velocities of all joints: those of slides stand beside those of hinges."""
-    each = [fit.robot_model.units(j) for j in range(fit.basis.n)]
-    return ", ".join(dict.fromkeys(force for force, _ in each)), ", ".join(dict.fromkeys(f"{way}/s" for _, way in each))
 
 
 def color_of(model: str) -> str:

@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from idbench.experiments.identification.fit import Fit
-from idbench.identify import MODELS, AbstractBlock, Array, Basis, Chain, Instants, OfJoints, instants, noise_spectra, spectrum
+from idbench.identify import MODELS, Array, Basis, Chain, Instants, OfJoints, instants, noise_spectra, spectrum
 from idbench.identify.arrays import combined
 from idbench.identify.basis import LoadFriction
 from idbench.identify.basis.joint_law import AbstractFriction
@@ -38,9 +38,7 @@ class Spectrum:
 def residual_instants(fit: Fit, forms: Iterable[str]) -> dict[str, Instants]:
     """Return the residuals of the equations of models, at every sample of the first log."""
     signals = fit.problem.signals[0]
-    basis = fit.basis
-    chain = fit.processing
-    return {form: instants(signals, basis, MODELS.create(form), chain, fit.estimates[form].X) for form in forms}
+    return {form: instants(signals, fit.basis, MODELS.create(form), fit.processing, fit.estimates[form].X) for form in forms}
 
 
 def of_joints(fit: Fit, left: Mapping[str, Instants]) -> dict[str, Instants]:
@@ -133,15 +131,15 @@ class FrictionCurves:
         conditions = {name: np.repeat(np.median(x, axis=-1)[:, None], len(v), axis=1) for name, x in state.conditions.items()}
         moving = State(q, np.tile(v, (len(q), 1)), np.zeros_like, conditions)
         for block in laws.blocks:
-            laws = laws.exchanged(block, _loaded(block, load))
+            of_all = block_of_all_joints(block)
+            made = _Loaded(load) if isinstance(of_all, LoadFriction) else of_all
+            laws = laws.exchanged(block, replace(block, block=made) if isinstance(block, OfJoints) else made)
         return combined(laws.explicit(moving), X, np.zeros(q.shape))[j]
 
     def _loads(self, j: int) -> list[float]:
         """Return the loads at which a law of a joint is drawn: one, if it depends on none."""
-        own = [
-            block_of_all_joints(block) for block in self._laws[0].blocks if not isinstance(block, OfJoints) or j in block.joints
-        ]
-        law = next((block for block in own if isinstance(block, LoadFriction)), None)
+        own = [block for block in self._laws[0].blocks if not isinstance(block, OfJoints) or j in block.joints]
+        law = next((law for law in map(block_of_all_joints, own) if isinstance(law, LoadFriction)), None)
         if law is None:
             return [0.0]
         load = np.abs(law.load(self.fit.problem.signals[0].state)[j])
@@ -165,12 +163,6 @@ class _Loaded(AbstractFriction):
 
     def force(self, q: Array, qd: Array) -> Array:
         return self.load * np.sign(qd)
-
-
-def _loaded(block: AbstractBlock, load: float) -> AbstractBlock:
-    """Return a block whose load is a given one."""
-    made = _Loaded(load) if isinstance(block_of_all_joints(block), LoadFriction) else block_of_all_joints(block)
-    return replace(block, block=made) if isinstance(block, OfJoints) else made
 
 
 def _rows_of(signals: Signals, chain: Chain, x: Array) -> Array:

@@ -6,7 +6,7 @@ from importlib.metadata import version
 from itertools import groupby
 from math import isfinite
 from operator import itemgetter
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from idbench.experiments.judgement.conclusion import Conclusion
 from idbench.experiments.judgement.held_out import HeldOut
 from idbench.experiments.judgement.judgement import Judgement, Unjudged
 from idbench.experiments.judgement.warnings import WEAK, doubtful
-from idbench.experiments.reports.estimates import EstimatesTable
+from idbench.experiments.reports.estimates import EstimatesTable, all_units
 from idbench.experiments.reports.figures import (
     causes_figure,
     color_of,
@@ -87,8 +87,6 @@ def _interval(fit: Fit, i: int, filed: float | None, reach: float) -> str:
     return "".join([*parts, "</svg>"])
 
 
-T = TypeVar("T")
-
 LONGEST = 20  # Correlations that are listed, the strongest ones
 
 
@@ -105,6 +103,8 @@ def report(
     A figure that fails is noted in `attempts`, and missing.
     """
     fit, robot_model = judgement.fit, judgement.fit.robot_model
+    lead = fit.estimates[fit.leading]
+    hardest = judgement.hardest
     cutoff = getattr(fit.processing.operator, "cutoff", None)
     return rendered(
         "idbench.experiments.reports",
@@ -113,13 +113,24 @@ def report(
         subtitle=f"{robot_model.tree.n} joints, {len(fit.basis.names)} parameters, {fit.request.method.estimator_name}",
         warnings={about: messages for about, messages in warnings.items() if messages},
         answer=answer,
-        **_of_judgement(judgement, attempts),
-        **_of_estimates(fit),
-        causes=_figure(attempts, "causes", causes_figure, fit),
-        friction=_figure(attempts, "friction", friction_figure, fit),
-        spectra=_figure(attempts, "spectra", spectra_figure, fit),
+        verdicts=[] if hardest is None else list(_verdicts(hardest)),
+        unjudged="; ".join(one.why for one in judgement.on if isinstance(one, Unjudged)),
+        failures=fit.failures,
+        unseen=[_held_out(one, attempts) for one in judgement.held_out],
+        torque_limits=[] if hardest is None else list(_torque_errors(hardest)),
+        models=[(model, color_of(model)) for model in fit.estimates],
+        leading=fit.leading,
+        filed="true value" if fit.truth else "robot's file",
+        reach=f"{interval_reach(fit):.2g}",
+        parameters=[(link, list(rows)) for link, rows in groupby(parameter_rows(fit), itemgetter("link"))],
+        legend=EstimatesTable(fit, (fit.leading,)).legend,
+        correlated=correlated(lead)[:LONGEST],
+        limits=[(cause, percentage(share), name, percentage(most)) for cause, share, name, most in error_shares(lead)],
+        causes=_figure(attempts, "causes", lambda: causes_figure(fit)),
+        friction=_figure(attempts, "friction", lambda: friction_figure(fit)),
+        spectra=_figure(attempts, "spectra", lambda: spectra_figure(fit)),
         joints=robot_model.robot.joints,
-        force=", ".join(dict.fromkeys(robot_model.units(j)[0] for j in range(fit.basis.n))),
+        force=all_units(robot_model)[0],
         logs=list(_logs(fit)),
         ranges=list(_ranges(fit)),
         notes=notes,
@@ -133,36 +144,9 @@ def report(
     )
 
 
-def _of_judgement(judgement: Judgement, attempts: Attempts) -> dict[str, Any]:
-    """Return verdicts and the held-out logs."""
-    hardest = judgement.hardest
-    return {
-        "verdicts": [] if hardest is None else list(_verdicts(hardest)),
-        "unjudged": "; ".join(one.why for one in judgement.on if isinstance(one, Unjudged)),
-        "failures": judgement.fit.failures,
-        "unseen": [_held_out(one, attempts) for one in judgement.held_out],
-        "torque_limits": [] if hardest is None else list(_torque_errors(hardest)),
-    }
-
-
-def _of_estimates(fit: Fit) -> dict[str, Any]:
-    """Return the table of parameters, and what limits them."""
-    lead = fit.estimates[fit.leading]
-    return {
-        "models": [(model, color_of(model)) for model in fit.estimates],
-        "leading": fit.leading,
-        "filed": "true value" if fit.truth else "robot's file",
-        "reach": f"{interval_reach(fit):.2g}",
-        "parameters": [(link, list(rows)) for link, rows in groupby(parameter_rows(fit), itemgetter("link"))],
-        "legend": EstimatesTable(fit, (fit.leading,)).legend,
-        "correlated": correlated(lead)[:LONGEST],
-        "limits": [(cause, percentage(share), name, percentage(most)) for cause, share, name, most in error_shares(lead)],
-    }
-
-
-def _figure(attempts: Attempts, name: str, draw: Callable[[T], str], shown: T) -> str:
+def _figure(attempts: Attempts, name: str, draw: Callable[[], str]) -> str:
     """Return a figure, or nothing if it fails."""
-    return attempts.attempt(f"the figure of {name} in report.html", lambda: draw(shown)) or ""
+    return attempts.attempt(f"the figure of {name} in report.html", draw) or ""
 
 
 def _verdicts(one: HeldOut) -> Iterator[tuple[str, str, str]]:
@@ -179,8 +163,9 @@ def _held_out(one: HeldOut, attempts: Attempts) -> tuple[str, str, str, list[str
         first = next(iter(torques.values()))
         cells = [cell for v in torques.values() for cell in (f"{v.rms[j]:.3g}", percentage(v.percent[j]), f"{v.R2[j]:.4f}")]
         rows.append([joint, f"{first.level[j]:.3g}", *cells])
-    figures = _figure(attempts, "torques", torques_figure, one), _figure(attempts, "residuals", residuals_figure, one)
-    return one.title, *figures, heads, rows
+    moved = _figure(attempts, "torques", lambda: torques_figure(one))
+    residuals = _figure(attempts, "residuals", lambda: residuals_figure(one))
+    return one.title, moved, residuals, heads, rows
 
 
 def _torque_errors(one: HeldOut) -> Iterator[list[str]]:

@@ -1,6 +1,6 @@
 """Curves as SVG that stands in a page: panels with axes, lines and dots, drawn without another package."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from html import escape
 
@@ -20,8 +20,6 @@ ABOVE = 30.0  # What an inch of a panel's height has for title and numbers [px]
 
 FINE = 2
 """Columns of curves for a pixel of a panel, so that a browser can enlarge them: each has its least and its largest sample."""
-
-Scale = Callable[[Array], Array]
 
 
 @dataclass
@@ -79,22 +77,10 @@ class Panel:
 
 
 def figure(panels: Sequence[Panel], height: float, x: str = "", y: str = "") -> str:
-    """Return panels as SVG, one picture each: a page puts as many beside each other as it is wide.
-
-    Parameters
-    ----------
-    panels : sequence of Panel
-        One for each joint, or each mistake.
-    height : float
-        Of a panel [inch].
-    x, y : str
-        What the axes are.
-    """
+    """Return panels of a height [inch] as SVG, one picture each: a page puts as many beside each other as it is wide."""
     size, drawn = _all(panels, height, WIDTH)
-    each = [
-        f'<svg class="curves" xmlns="{SVG}" viewBox="0 0 {size[0]:.0f} {size[1]:.0f}" font-size="11">{one}</svg>'
-        for one in drawn
-    ]
+    head = f'<svg class="curves" xmlns="{SVG}" viewBox="0 0 {size[0]:.0f} {size[1]:.0f}" font-size="11">'
+    each = [f"{head}{one}</svg>" for one in drawn]
     words = [f"<span>{escape(_axes(x, y))}</span>"]
     for kind, color, label in _labels(panels):
         shape = "line dashed" if len(kind.split()) > 1 else kind.strip()

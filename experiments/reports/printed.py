@@ -14,7 +14,7 @@ from idbench.experiments.identification.causes import words_of_diagnosis
 from idbench.experiments.identification.fit import Fit
 from idbench.experiments.identification.iterations import words_of_iterations
 from idbench.experiments.judgement.remedies import NEGLIGIBLE, SURE
-from idbench.experiments.reports.estimates import EstimatesTable, differing, explained
+from idbench.experiments.reports.estimates import EstimatesTable, all_units, differing, explained
 from idbench.experiments.reports.uncertainty import words_of_uncertainty
 from idbench.experiments.text import new_table, print_titled
 from idbench.identify import AsLogged, TorqueChannel
@@ -27,33 +27,17 @@ ONE_BELOW_THE_OTHER = 16
 def print_fit(console: Console, fit: Fit, title: str, whole: tuple[str, ...], *, verbose: bool = False) -> None:
     """Print the estimates: value with standard error, unit and %sigma, or truth and error where that is known.
 
-    Models that are not among the `whole` ones have a line each.
-
-    Parameters
-    ----------
-    console : Console
-        Where to.
-    fit : Fit
-        The fit.
-    title : str
-        What was identified.
-    whole : tuple of str
-        Models whose estimates are shown.
-    verbose : bool
-        Whether Cond(W), rows, noise, correlations and iterations are shown, too.
+    Models that are not among the `whole` ones have a line each; `verbose`: with Cond(W), rows, noise, correlations, iterations.
     """
     table = EstimatesTable(fit, whole)
+    method = fit.request.method
+    is_known = fit.truth is not None
     of = f"{whole[0]} model, " if len(whole) == 1 else ""
-    grid = _grid(table, console.width, complete=verbose or fit.truth is not None)
-    print_titled(
-        console,
-        f"{title}: {of}{fit.request.method.estimator_name}, chain {fit.request.method.chain_name}",
-        grid,
-        2 + (fit.truth is not None),
-    )
+    grid = _grid(table, console.width, complete=verbose or is_known)
+    print_titled(console, f"{title}: {of}{method.estimator_name}, chain {method.chain_name}", grid, 2 + is_known)
     if table.legend:
         console.print(Text(table.legend))
-    complete = len(whole) > 1 and (verbose or fit.truth is not None)
+    complete = len(whole) > 1 and (verbose or is_known)
     for words in (*differing(fit, whole), *_told(fit), *(_details(fit, complete) if verbose else ())):
         console.print(Text(words), soft_wrap=True)
     if len(fit.logs.fitted) > 1 and fit.torque_errors:
@@ -132,12 +116,12 @@ def _told(fit: Fit) -> Iterator[str]:
         yield f"slow motion is masked, because the rest predicts held-out stretches better without it: {each} (--mask-speed)"
     if fit.request.smooth:
         sizes = " ".join(f"{x:.2g}" for x in fit.request.smooth)
-        unit = ", ".join(dict.fromkeys(fit.robot_model.units(j)[0] for j in range(fit.basis.n)))
-        yield f"smooth functions of velocity beside these laws, of a size that the log decides: {sizes} {unit}"
-    if fit.robot_model.asked.prior:
+        force, _ = all_units(fit.robot_model)
+        yield f"smooth functions of velocity beside these laws, of a size that the log decides: {sizes} {force}"
+    if asked.prior:
         share = fit.request.share or fit.robot_model.roughly_known.share
         near = f"; links near the file's, to {100 * share:.0f} % as the log decides" if fit.request.share and share else ""
-        yield f"roughly known: {', '.join(fit.robot_model.asked.prior)}{near}"
+        yield f"roughly known: {', '.join(asked.prior)}{near}"
 
 
 def _delay(channel: TorqueChannel) -> str:
@@ -173,8 +157,8 @@ def _print_logs(console: Console, fit: Fit) -> None:
     grid = new_table("", fit.robot_model.robot.joints)
     for k in range(len(fit.logs.fitted)):
         grid.add_row(fit.logs.name(k), *(f"{x:.2g}" if isfinite(x) else "" for x in errors[k]))
-    unit = ", ".join(dict.fromkeys(fit.robot_model.units(j)[0] for j in range(fit.basis.n)))
-    print_titled(console, f"residual of the {model} model in each log while joints move: rms [{unit}]", grid)
+    force, _ = all_units(fit.robot_model)
+    print_titled(console, f"residual of the {model} model in each log while joints move: rms [{force}]", grid)
 
 
 def _rotors(fit: Fit) -> Iterator[str]:
@@ -199,15 +183,12 @@ def _rotors(fit: Fit) -> Iterator[str]:
 
 def _noise(fit: Fit) -> str:
     """Return the noise of a log in words, joint by joint."""
-    torque = " ".join("?" if x is None else f"{x:.2g}" for x in fit.noise["torque"])
-    position = " ".join("?" if x is None else f"{x:.2g}" for x in fit.noise["position"])
-    slides = [joint.kind == "slide" for joint in fit.robot_model.tree.joints]
-    units = (fit.robot_model.units(j) for j in range(fit.basis.n))
-    force, length = (", ".join(dict.fromkeys(each)) for each in zip(*units, strict=True))
+    torque, position = (" ".join("?" if x is None else f"{x:.2g}" for x in fit.noise[kind]) for kind in ("torque", "position"))
+    force, length = all_units(fit.robot_model)
     words = f"white noise of the log: torque {torque} {force}, position {position} {length}"
     steps = fit.noise["encoder_step"]
     if not any(steps):
         return words
-    each = zip(steps, slides, strict=True)
-    bits = " ".join("-" if slide else f"{log2(2 * pi / step):.1f}" if step else "?" for step, slide in each)
+    each = zip(steps, fit.robot_model.tree.joints, strict=True)
+    bits = " ".join("-" if joint.kind == "slide" else f"{log2(2 * pi / step):.1f}" if step else "?" for step, joint in each)
     return f"{words}; encoder steps {' '.join(f'{x:.3g}' if x else '?' for x in steps)} {length} ({bits} bits)"

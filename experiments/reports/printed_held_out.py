@@ -9,24 +9,16 @@ from rich.text import Text
 
 from idbench.experiments.judgement.held_out import WORDS, HeldOut
 from idbench.experiments.judgement.judgement import Unjudged
+from idbench.experiments.reports.estimates import all_units
 from idbench.experiments.text import error_percentage, new_table, percentage, print_titled
 from idbench.identify import Array
 from idbench.identify.judge.torque_interval import LEVEL, MOST
 
 
 def print_held_out(console: Console, one: HeldOut | Unjudged, whole: Sequence[str], *, verbose: bool = False) -> None:
-    """Print how well torques of a held-out log are predicted, and what the simulated robot does on it.
+    """Print how well `whole` models predict the torques of a held-out log, and what the simulated robot does on it.
 
-    Parameters
-    ----------
-    console : Console
-        Where to.
-    one : HeldOut or Unjudged
-        The log, and the fit on it.
-    whole : sequence of str
-        Models that are shown.
-    verbose : bool
-        Whether intervals and the verdict on each model are shown, too.
+    `verbose`: intervals and the verdict on each model, too.
     """
     if isinstance(one, Unjudged):
         console.print(Text(f"not judged on {one.title}: {one.why}\n"), soft_wrap=True)
@@ -34,9 +26,7 @@ def print_held_out(console: Console, one: HeldOut | Unjudged, whole: Sequence[st
     torques = {model: validation for model, validation in one.torques.items() if model in whole} or one.torques
     joints = one.fit.robot_model.robot.joints
     simulated = any(one.position_error(model) is not None for model in torques)
-    torque, position = (
-        ", ".join(dict.fromkeys(each)) for each in zip(*map(one.fit.robot_model.units, range(len(joints))), strict=True)
-    )
+    torque, position = all_units(one.fit.robot_model)
     what = (f"rms [{torque}]", "%", *((f"position [{position}]",) * simulated))
     heads = [f"{model}\n{each}" if len(torques) > 1 else each for model in torques for each in what]
     grid, first = new_table("", [*heads, "noise %, at most"]), next(iter(torques.values()))
@@ -61,11 +51,10 @@ def print_held_out(console: Console, one: HeldOut | Unjudged, whole: Sequence[st
 def _details_of(one: HeldOut, standing: Array) -> Iterator[str]:
     """Yield intervals, errors at rest, and the verdict on each model."""
     best = one.fit.leading
-    joints = one.fit.robot_model.robot.joints
     if (within := one.within_interval(best)) is not None and one.fit.torque_intervals[best] is not None:
         yield _interval_words(one, best, *within)
-    units = (one.fit.robot_model.units(j)[0] for j in range(len(joints)))
-    each = zip(joints, standing, units, strict=True)
+    joints = one.fit.robot_model.robot.joints
+    each = zip(joints, standing, (one.fit.robot_model.units(j)[0] for j in range(len(joints))), strict=True)
     if apart := [f"{joint} {rms:.2g} {unit}" for joint, rms, unit in each if isfinite(rms)]:
         yield f"at rest and reversing, where friction is not determined: {', '.join(apart)}"
     for (word, reasons), (model, *others) in one.alike.items():
@@ -80,12 +69,12 @@ def _interval_words(one: HeldOut, model: str, inside: Array, outside: float) -> 
     interval, joints = one.fit.torque_intervals[model], one.fit.robot_model.robot.joints
     assert interval is not None
     half = " ".join(f"{x:.2g}" if isfinite(x) else "-" for x in interval.half)
-    unit = ", ".join(dict.fromkeys(one.fit.robot_model.units(j)[0] for j in range(len(joints))))
+    force, _ = all_units(one.fit.robot_model)
     share = np.nan_to_num(inside, nan=1.0)
     worst = f", of {joints[int(share.argmin())]} {100 * share.min():.0f} %" if len(joints) > 1 else ""
     expected = 2 * (1 - MOST) * len(joints)  # of speeds and torques
     words = (
-        f"{100 * LEVEL:.0f} % intervals of the torque up to {interval.band:g} Hz, +- {half} {unit}: they contain "
+        f"{100 * LEVEL:.0f} % intervals of the torque up to {interval.band:g} Hz, +- {half} {force}: they contain "
         f"{100 * np.nanmean(inside):.0f} %{worst}"
     )
     beyond = f"{100 * outside:.0f} % of the motion is outside the fitted speeds and torques, where no interval holds"

@@ -41,12 +41,7 @@ def write_streams(streams: "Streams", folder: ResultsFolder | None) -> None:
 class Attempts:
     """Works on results that are complete; one that fails takes nothing away from the others.
 
-    Parameters
-    ----------
-    kept : str
-        What is there whatever fails.
-    folder : ResultsFolder, optional
-        Where the results are, and tracebacks of faults go.
+    `kept` says what is there whatever fails; `folder` is where the results are, and tracebacks of faults go.
     """
 
     def __init__(self, kept: str, folder: ResultsFolder | None = None) -> None:
@@ -77,8 +72,7 @@ class Attempts:
 
     def file(self, name: str, make: Callable[[], str | bytes]) -> None:
         """Write what `make` returns as a file beside the results."""
-        if self._folder is not None:
-            folder = self._folder
+        if (folder := self._folder) is not None:
             self.attempt(name, lambda: folder.add(name, make()))
 
     def recording(self, make: "Callable[[], Streams]") -> None:

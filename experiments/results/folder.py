@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from fnmatch import fnmatch
 from pathlib import Path
 
-from idbench.experiments.errors import ResultsError
+from idbench.experiments.errors import REPORT, ResultsError
 from idbench.experiments.results.writing import NAME, Manifest, Read, WrittenFile, digest, exchange, hidden_folder
 
 try:
@@ -18,7 +18,7 @@ except ImportError:  # not on Windows, where two processes in one folder are not
 
 RECORDING = "recording.rrd"  # The recording to which identifications add their layers
 
-COMMON = ("summary.json", RECORDING, "recording.*.rrd", "log*.parquet", "fault.txt")
+COMMON = ("summary.json", RECORDING, "recording.*.rrd", "log*.parquet", REPORT)
 
 FILES: Mapping[str, tuple[str, ...]] = {
     "run": (*COMMON, "scenario.toml", "servo.toml", "commands.csv"),
@@ -27,10 +27,10 @@ FILES: Mapping[str, tuple[str, ...]] = {
     "table1-motions": (*COMMON, "motions.png"),
     "table2": COMMON,
     "excite": (*COMMON, "scenario.toml", "report.html", "motion*.csv"),
-    "payload": ("summary.json", "fault.txt"),
-    "gains": ("summary.json", "fault.txt"),
-    "servo": ("summary.json", RECORDING, "fault.txt"),
-    "study": ("summary.json", "report.html", "recording.rrd", "fault.txt"),
+    "payload": ("summary.json", REPORT),
+    "gains": ("summary.json", REPORT),
+    "servo": ("summary.json", RECORDING, REPORT),
+    "study": ("summary.json", "report.html", RECORDING, REPORT),
 }
 """What an experiment may write: files of these names are looked for before the work."""
 
@@ -110,9 +110,8 @@ class ResultsFolder:
             try:
                 fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:
-                raise ResultsError(
-                    f"another process is writing its results to {self.out}: wait for it, or choose another --out"
-                ) from None
+                message = f"another process is writing its results to {self.out}: wait for it, or choose another --out"
+                raise ResultsError(message) from None
             except OSError:  # a file system without locks: the exchange of files looks once more
                 pass
             yield
@@ -151,12 +150,11 @@ class ResultsFolder:
         own = {path.name for path in paths if manifest.owns(path.name)}
         for path in paths:
             self._require_exchangeable(self.out / path.name, path.name in own)
-        gone = self._old(manifest) - {path.name for path in paths} if complete else set()
+        gone = {name for name in manifest.files if complete and self._writes(name) and manifest.owns(name)}
+        gone -= {path.name for path in paths}
         kept = {} if complete or self.force else manifest.files  # of another command, and only laid out anew
-        written = {
-            path.name: WrittenFile(kept[path.name].command if path.name in kept else self.command, (digest(path),))
-            for path in paths
-        }
+        commands = {path.name: kept[path.name].command if path.name in kept else self.command for path in paths}
+        written = {path.name: WrittenFile(commands[path.name], (digest(path),)) for path in paths}
         manifest.save(written, gone)
         for path in paths:
             try:
@@ -175,10 +173,6 @@ class ResultsFolder:
             raise ResultsError(f"{target} is a file that this command reads: choose another --out")
         if target.exists() and not own and not self.force:
             raise self._strange(target)
-
-    def _old(self, manifest: Manifest) -> set[str]:
-        """Return the files of earlier results, as idbench wrote them."""
-        return {name for name in manifest.files if self._writes(name) and manifest.owns(name)}
 
     def _writes(self, name: str) -> bool:
         """True if results may have a file of that name."""

@@ -110,12 +110,8 @@ NOT_SAVED = "not saved: --out FOLDER keeps it, with a report and a recording"  #
 class Page(Console):
     """A console that keeps what is printed until it is shown; what cannot be shown is reported at the end.
 
-    `contextlib.closing` shows it at the end of a block, however that ends: it is worth keeping.
-
-    Parameters
-    ----------
-    machine : bool
-        Whether a program reads standard output: it gets `found` as JSON, and people read the text on the error stream.
+    `contextlib.closing` shows it at the end of a block, however that ends: it is worth keeping. Of a `machine`, a program reads
+    standard output: it gets `found` as JSON, and people read the text on the error stream.
     """
 
     def __init__(self, *, machine: bool = False) -> None:

@@ -67,18 +67,9 @@ def require_free_folder(path: Path, option: str, *, force: bool = False) -> None
 
 
 def require_free(path: Path, option: str, *, force: bool = False, read: Read = ()) -> None:
-    """Raise ResultsError if a file cannot be written to `path`, before the work that it takes; `option` names it.
+    """Raise ResultsError if a file cannot be written to `path`, before the work that it takes; `option` named it.
 
-    Parameters
-    ----------
-    path : Path
-        The file.
-    option : str
-        The option that named it.
-    force : bool
-        Whether a file that is there may be replaced.
-    read : sequence of Path
-        Files that the command reads.
+    `force`: a file that is there may be replaced, but none of those that the command reads.
     """
     _require_place(path, option, read)
     if path.exists() and not force:
@@ -179,10 +170,8 @@ def hidden_folder(folder: Path) -> Iterator[Path]:
 def _is_running(process: int) -> bool:
     try:
         os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    except OSError:  # somebody else's
-        return True
+    except OSError as error:  # others than this: it is somebody else's
+        return not isinstance(error, ProcessLookupError)
     return True
 
 

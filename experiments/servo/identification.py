@@ -18,7 +18,7 @@ from idbench.identify import Array, MotionLog, TorqueChannel
 from idbench.identify.files.servo_file import ServoFile
 from idbench.identify.files.servo_log import ServoColumns
 from idbench.identify.servo import Servo, ServoFit, ServoRun, identify_servo
-from idbench.identify.servo.choice import choose_friction, residuals_by_state
+from idbench.identify.servo.choice import choose_friction
 from idbench.identify.servo.law import EXACT, KINDS
 from idbench.identify.servo.parameters import SERVO_PARAMETERS
 from idbench.identify.servo.run import without_spikes
@@ -210,8 +210,3 @@ def gains_of(fit: ServoFit) -> dict[str, Any]:
 def unit_of(servo: Servo, name: str) -> str:
     """Unit of a parameter; that of a is what its loop commands."""
     return KINDS[servo.kind].unit if name == "a" else SERVO_PARAMETERS[name].unit
-
-
-def lacks_summary(fit: ServoFit) -> dict[str, Any]:
-    """Summary of a fit's residuals by state."""
-    return {"friction": fit.friction, "residuals": [lack._asdict() for lack in residuals_by_state(fit)]}

@@ -13,7 +13,7 @@ from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.causes import suspect_summary
 from idbench.experiments.identification.robot_model import absolute
 from idbench.experiments.requests.jobs import ServoRequest
-from idbench.experiments.servo.identification import AUTO, Servos, lacks_summary, summary_of
+from idbench.experiments.servo.identification import AUTO, Servos, summary_of
 from idbench.experiments.servo.joints import Identified
 from idbench.experiments.servo.servo_text import remedy_of, servo_table, verdict_lines, warnings_of
 from idbench.identify import Array, IdentificationError, SettingError
@@ -21,7 +21,7 @@ from idbench.identify.files.servo_file import ServoFile
 from idbench.identify.files.servo_log import ServoColumns, ordered, read_servo_log
 from idbench.identify.judge.suspect import Suspect
 from idbench.identify.servo import SERVO_FRICTIONS, ServoFit
-from idbench.identify.servo.choice import ServoFrictionChoice
+from idbench.identify.servo.choice import ServoFrictionChoice, residuals_by_state
 from idbench.identify.servo.fit import require_possible
 from idbench.identify.servo.law import EXACT, TimeSteps
 from idbench.identify.servo.mistakes import mistake_of
@@ -85,17 +85,35 @@ class ServosFit:
         return Document(title, loops, self.verdicts, self.warnings, [table], self.lines, self._figures)
 
     def _figures(self) -> list[tuple[str, str]]:
-        from idbench.experiments.reports.servo_figures import servo_figures
+        """Titles and pictures of the positions of the last log, and of their errors."""
+        from idbench.experiments.reports.figures import color_of  # half a second that others do not need
+        from idbench.experiments.reports.panels import Panel, figure
 
-        return servo_figures(self)
+        judged = self.others or self.servos
+        path, columns = list(judged.logs.items())[-1]
+        moved, off = list[Panel](), list[Panel]()
+        for joint, q in judged.simulated(self.fits, path).items():
+            place = judged.place(joint)
+            measured, panel, error = columns.q[:, place], Panel(joint), Panel(joint)
+            panel.line(columns.t, columns.command[:, place], "#c9a227", 1.0, "command")
+            panel.line(columns.t, measured, "#8c8c8c", 2.4, "measured")
+            panel.line(columns.t, q, color_of("explicit"), 1.0, "simulated from the commands")
+            error.line(columns.t, measured - q, color_of("explicit"), 0.8)
+            moved.append(panel)
+            off.append(error)
+        return [
+            (f"Positions: {judged.name(path)}", figure(moved, 1.6, "time [s]", "position [rad]")),
+            (f"Errors: {judged.name(path)}", figure(off, 1.35, "time [s]", "measured - simulated [rad]")),
+        ]
 
     def parameters(self) -> dict[str, Any]:
         """Summary of the fits."""
         laws = {joint: {"errors": choice.errors, "p": choice.p} for joint, choice in self.choices.items()}
+        lacks = {joint: [lack._asdict() for lack in residuals_by_state(fit)] for joint, fit in self.fits.items()}
         return {
             **({"laws": laws} if laws else {}),
             "joints": {joint: summary_of(fit) for joint, fit in self.fits.items()},
-            "lack_of_fit": {joint: lacks_summary(fit) for joint, fit in self.fits.items()},
+            "lack_of_fit": {j: {"friction": fit.friction, "residuals": lacks[j]} for j, fit in self.fits.items()},
             "diagnosis": [
                 suspect_summary(mistake, [joint], mistake.unit, remedy_of(mistake)) for joint, mistake in self.mistakes.items()
             ],
@@ -107,12 +125,10 @@ class ServosFit:
         return self.parameters() | {"position_error": each, "verdict": [line for _, line in self.verdicts]}
 
 
-Heard = Callable[[str, Identified | str, ServosFit], None]
-"""Hears the result of a joint, and all results so far."""
-
-
-def servos_identified(asked: ServoRequest, heard: Heard | None = None) -> ServosFit:
-    """Servos of a robot, identified joint by joint.
+def servos_identified(
+    asked: ServoRequest, heard: Callable[[str, Identified | str, ServosFit], None] | None = None
+) -> ServosFit:
+    """Servos of a robot, identified joint by joint; `heard` is called with each result, and with all results so far.
 
     Raises
     ------

@@ -97,16 +97,11 @@ def _gravity(robot: Robot, q: Array) -> tuple[Array, Array, Array]:
     """
     still = np.zeros_like(q)
     there = inverse_dynamics(robot, q, still, still)
-    quarter = np.stack([inverse_dynamics(robot, _moved(q, j), still, still)[:, j] for j in range(robot.n)], axis=1)
+    turned = q + np.pi / 2 * np.eye(robot.n)[:, None]  # shape (joint that is turned, time, joint)
+    quarter = np.stack([inverse_dynamics(robot, turned[j], still, still)[:, j] for j in range(robot.n)], axis=1)
     sine, cosine = there * np.sin(q) + quarter * np.cos(q), there * np.cos(q) - quarter * np.sin(q)
     slides = np.asarray(robot.slides, dtype=bool)
     return np.where(slides, 0.0, sine), np.where(slides, 0.0, cosine), np.where(slides, there, 0.0)
-
-
-def _moved(q: Array, j: int) -> Array:
-    moved = q.copy()
-    moved[:, j] += np.pi / 2
-    return moved
 
 
 def _constant(x: Array) -> Array:
@@ -117,9 +112,6 @@ def _constant(x: Array) -> Array:
 
 Identified = ServoFit | ServoFrictionChoice
 """Of one joint: its fit, or those with all laws of friction."""
-
-Identify = Callable[[int, Sequence[ServoRun]], Identified]
-"""Identifies one joint by its number and its runs."""
 
 
 SWEEPS = 4
@@ -181,7 +173,9 @@ class Joints:
             before, change = moving, apart
         return runs
 
-    def identified(self, identify: Identify, motors: Sequence[Sequence[int]] = ()) -> Iterator[tuple[int, Identified | str]]:
+    def identified(
+        self, identify: Callable[[int, Sequence[ServoRun]], Identified], motors: Sequence[Sequence[int]] = ()
+    ) -> Iterator[tuple[int, Identified | str]]:
         """Yield the result of each joint, or why it has none; joints of an arm come again when more is known.
 
         Encoder counts hide accelerations. Joints are therefore fitted a second time, starting from their first estimates, to
@@ -190,8 +184,11 @@ class Joints:
         """
         moving = dict[int, ServoFit]()
         for j, (joint, runs) in enumerate(zip(self.links.joints, self.runs, strict=True)):
+            if self.links.slides[j] and runs[0].servo.kind == Servo.kind:
+                yield j, f"{joint} slides: gain and counts of servo.toml are those of a joint that turns"
+                continue
             with stage(joint):
-                result, fit = self._first(identify, j, runs)
+                result, fit = _attempt(partial(identify, j, runs))
             if fit is not None:
                 moving[j] = fit
             yield j, result
@@ -244,11 +241,6 @@ class Joints:
                     late = before[j].p["delay"]
                     changes[k] = per_offset(fit, searched_runs(now[j], late), searched_runs(runs[j], late))
         return together(joints, assumed)
-
-    def _first(self, identify: Identify, j: int, runs: Sequence[ServoRun]) -> tuple[Identified | str, ServoFit | None]:
-        if self.links.slides[j] and runs[0].servo.kind == Servo.kind:
-            return f"{self.links.joints[j]} slides: gain and counts of servo.toml are those of a joint that turns", None
-        return _attempt(partial(identify, j, runs))
 
     def _moving(self, fits: Mapping[int, ServoFit], runs: Sequence[Sequence[ServoRun]]) -> list[dict[int, Moving]]:
         """Simulated motion of joints with these loads, in each log."""

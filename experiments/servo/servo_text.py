@@ -64,12 +64,9 @@ def value_of(fit: ServoFit, name: str) -> str:
     """A parameter with its standard error, or the factor that it is known up to."""
     if name not in fit.p:
         return ""
-    sigma = fit.standard_errors.get(name)
     if name in fit.unscaled:
-        low, high = fit.factor
-        if name == "offset":
-            return "no scale"
-        return f"{number(fit.p[name])} x {low:.2g} to {high:.2g}"
+        return "no scale" if name == "offset" else "{} x {:.2g} to {:.2g}".format(number(fit.p[name]), *fit.factor)
+    sigma = fit.standard_errors.get(name)
     return f"{number(fit.p[name])} held" if sigma is None else concise(fit.p[name], sigma)
 
 
@@ -135,14 +132,8 @@ def verdict_lines(
 ) -> list[tuple[str, str]]:
     """Lines, each after its verdict: whether models hold on held-out logs ("unsure" of other lines), and what they lack.
 
-    Parameters
-    ----------
-    fits, fitted, held_out
-        By joint: the fit, and mean errors of positions in the fitted and in the held-out logs [rad].
-    moved : mapping of str to float
-        Rms of the motion of the held-out logs about its mean [rad].
-    mistakes : mapping of str to Suspect
-        What was proved to be wrong.
+    All by joint: mean errors of positions in the fitted and in the held-out logs [rad], shape (log,), rms of the motion of the
+    held-out logs about its mean [rad], and what was proved to be wrong.
     """
     lines = []
     word_of = dict[str, str]()
@@ -202,13 +193,9 @@ def _lacks(fit: ServoFit) -> str:
 def choice_table(joint: str, choice: ServoFrictionChoice) -> Listing:
     """Table of laws of friction compared by parts of the log that their fits did not see."""
     first = next(iter(choice.errors))
-    rows = (
-        (
-            f"{law}{' (chosen)' if law == choice.chosen else ''}",
-            number(1e3 * error),
-            f"{choice.p[law]:.2g}" if law in choice.p else "",
-        )
-        for law, error in choice.errors.items()
-    )
+    rows = []
+    for law, error in choice.errors.items():
+        name = f"{law} (chosen)" if law == choice.chosen else law
+        rows.append((name, number(1e3 * error), f"{choice.p[law]:.2g}" if law in choice.p else ""))
     title = f"{joint}: laws of friction, by the error of parts of the log that their fits did not see"
     return Listing(title, ("law", "mrad", f"p, against {first}"), tuple(rows))

@@ -8,7 +8,7 @@ import rerun.blueprint as rrb
 
 from idbench.experiments.cli import main
 from idbench.experiments.recording.folder import files, known
-from idbench.experiments.recording.layouts import noise
+from idbench.experiments.recording.run_layouts import noise
 from idbench.experiments.recording.views import Shelf
 
 STEP = 2 * np.pi / (4 * 4096)
