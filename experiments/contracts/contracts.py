@@ -77,6 +77,12 @@ def _loaded(name: str) -> tuple[Table[Any], Any]:
     return there[0], made
 
 
+def kept(name: str, example: Example) -> Iterator[tuple[str, str]]:
+    """Yield what the plug-in of a name is asked, and why it does not keep it; the tests of plug-in packages ask this."""
+    table, plugin = found(name)
+    yield from keeps(table, plugin, example)
+
+
 def keeps(table: Table[Any], plugin: Any, example: Example) -> Iterator[tuple[str, str]]:
     """Yield what a plug-in of a table is asked, and why it does not keep it; empty if it does."""
     for clause in (identification.is_immutable, *CONTRACTS[table.point]):
