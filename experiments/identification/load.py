@@ -23,7 +23,7 @@ from idbench.identify.judge.band import Band
 from idbench.identify.rows.rows import is_long
 from idbench.identify.signals.filters import REACH, shift
 from idbench.identify.telling import stage
-from idbench.sim.robot.time_steps import apparent_rotor_inertia, integrator_name, torque_of_steps
+from idbench.sim.robot.time_steps import acting_late, apparent_rotor_inertia, integrator_name, torque_of_steps
 
 EVIDENT, HALF = 0.1, 0.5
 """Shares of what the file's own parameters leave of the torques that they leave without the integrator's part, in a quarter and
@@ -78,7 +78,8 @@ class SimulatedLogs:
             ceil((DERIVATIVES * s.halo(log.fs) + abs(log.torque.delay)) * log.fs) + REACH,
         )
         instantaneous = log.torque.delay == 0 and not log.torque.lags
-        torque = replace(log.torque, meaning="instantaneous", period=None) if instantaneous else log.torque
+        late = acting_late(self.robot_model.robot)
+        torque = replace(log.torque, meaning="instantaneous", period=None, delay=late) if instantaneous else log.torque
         return replace(log, tau=tau, torque=torque).part(edge, log.samples - edge)
 
     def _evident(self, logs: Sequence[MotionLog], request: Request) -> bool:

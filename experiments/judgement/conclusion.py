@@ -77,7 +77,7 @@ def _power(fit: Fit) -> Iterator[str]:
     if fit.hidden_gains is not None:
         some = [(x, joint) for x, joint in zip(fit.hidden_gains, joints, strict=True) if joint not in still]
         worst, joint = max(some)
-        if not np.isfinite(worst):
+        if not worst < 1:
             yield f"it cannot see a wrong torque constant of {joint}"
         elif worst > WEAK:
             yield f"it would not see a torque constant of {joint} that is {error_percentage(100 * worst)} off"

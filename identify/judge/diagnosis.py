@@ -44,7 +44,8 @@ def diagnosed(problem: Problem, X: Array) -> tuple[Suspect, ...]:
     whole = whole_mistakes(_thinned(problem.explicit), small[0] if small else None)
     if whole and small and (whole[0].cause, whole[0].joint) == (small[0].cause, small[0].joint):
         there = {(each.cause, each.joint) for each in whole}
-        return (*whole, *(each for each in small if (each.cause, each.joint) not in there))
+        first = replace(whole[0], sigma=small[0].sigma, explained=small[0].explained)
+        return (first, *whole[1:], *(each for each in small if (each.cause, each.joint) not in there))
     if whole:
         return (*whole, *_besides(problem.explicit, whole))
     return tuple(small) or tuple(_impossible_signs(problem.explicit, X))  # of a wrong model friction may be negative, too

@@ -37,6 +37,8 @@ NOTHING_LEFT = 1 / 9
 """Share of squared errors beyond noise that the right sign or axis leaves at most: a wrong one also explains a part of other
 mistakes."""
 
+HALF = 0.5  # Share of an error that such a mistake may leave though it is noise: a small one has its own test
+
 GRAVITY = 9.81  # [m/s^2]
 DEGREE = np.pi / 180  # [rad]
 TURNS, SETTLED = 8, 1.0  # Steps of its direction at most, and what each must take of the misfit
@@ -89,7 +91,8 @@ def whole_mistakes(problem: Problem, small: Suspect | None = None) -> list[Suspe
             break
         errors = held_out_errors(best.problem)
         k = int(np.argmax(np.log(before_errors) - np.log(errors)))
-        if left_unexplained(before_errors, errors, noise)[k] > NOTHING_LEFT:
+        left = left_unexplained(before_errors, errors, noise)[k]
+        if left > NOTHING_LEFT or errors[k] > HALF * before_errors[k]:
             continue
         if small and gain < DECISIVE + small.evidence:
             return [replace(small, alternatives=(*small.alternatives, (best.cause, best.joint)))]
@@ -192,13 +195,13 @@ def _exchanged(problem: Problem) -> Iterator[_Tried]:
 
 def _gravities(problem: Problem) -> Iterator[_Tried]:
     """Yield gravity the other way, and none: a robot on a ceiling, a driver that takes weight out of the torques."""
-    if (tree := tree_of(problem.basis)) is not None and np.any(tree.gravity):
+    if (tree := tree_of(problem.basis)) is not None and np.any(tree.gravity) and not problem.logs[0].poses:
         yield from (_with_gravity(problem, problem.basis, share * tree.gravity) for share in (-1.0, ALMOST_NONE))
 
 
 def _across(problem: Problem) -> Iterator[_Tried]:
     """Yield gravity along the other axes of the base: a robot on a wall; along each, where the file has none."""
-    if (tree := tree_of(problem.basis)) is None:
+    if (tree := tree_of(problem.basis)) is None or problem.logs[0].poses:  # of which gravity is all there is
         return
     g, there = float(np.linalg.norm(tree.gravity)) or GRAVITY, bool(np.any(tree.gravity))
     axes = np.linalg.svd(tree.gravity[None])[2][1:] if there else np.eye(3)
@@ -210,7 +213,7 @@ def _across(problem: Problem) -> Iterator[_Tried]:
 def _tilted(problem: Problem) -> Iterator[_Tried]:
     """Yield the most likely direction of gravity: [X; tilt] by least squares, turn by turn."""
     tree, counts = tree_of(problem.basis), problem.factors.rows
-    if tree is None or not np.any(tree.gravity):
+    if tree is None or not np.any(tree.gravity) or problem.logs[0].poses:
         return
     basis = problem.basis if problem.prior else with_first_link_moments(problem.basis)
     begins = [_with_gravity(problem, basis, tree.gravity), *_across(problem)]

@@ -9,18 +9,18 @@ from idbench.sim.robot.inverse_dynamics import inverse_dynamics
 from idbench.sim.robot.motors import Array
 from idbench.sim.robot.robot import Robot
 
-VELOCITY = 2  # Place of what multiplies the velocity among the numbers of an actuator's bias: -kv of `position`
+POSITION, VELOCITY = 1, 2  # Places of what multiplies them among the numbers of an actuator's bias: -kp and -kv of `position`
 
 
 def apparent_rotor_inertia(robot: Robot) -> Array:
     """Apparent additional rotor inertia in torques that the robot's own actuators made, shape (joint,) [kg m^2, kg].
 
-    h (kv + D / 2) by the implicit integrators, h D / 2 by Euler's, and -h D / 2 where `eulerdamp` is disabled: see
-    `torque_of_steps`.
+    h (kv + D / 2) by the implicit integrators, h D / 2 by Euler's, -h D / 2 where `eulerdamp` is disabled, and h kv / 2 by RK4:
+    see `torque_of_steps`.
     """
     model, h = robot.model, robot.model.opt.timestep
     if _is(robot, mujoco.mjtIntegrator.mjINT_RK4):
-        return np.zeros(robot.n)
+        return h / 2 * actuator_damping(robot)
     side = 1 if _is(robot, mujoco.mjtIntegrator.mjINT_IMPLICIT) else -1
     return np.asarray(h * (_at_the_end(robot) + side * model.dof_damping / 2))
 
@@ -38,13 +38,14 @@ def torque_of_steps(robot: Robot, motion: Sequence[Array]) -> Array:
         v(k) = qd - h/2 qdd + h^2/6 dqdd/dt,   v(k+1) = qd + h/2 qdd + h^2/6 dqdd/dt
 
     with the Coriolis torques of v(k+1) by `implicit`; Euler takes the joints' damping alone at the end, and not even that if
-    `eulerdamp` is disabled. Nothing is said of Runge-Kutta, by which a control acts for a whole step, and what it meets changes
-    within.
+    `eulerdamp` is disabled. By Runge-Kutta a control acts for a whole step on the joint as it moves within: the mean of the
+    step, `acting_late` after its beginning, is tau(k) - h/2 (kp qd + kv qdd) - h^2/6 (kp qdd + kv dqdd/dt).
     """
     q, qd, qdd, jerk, snap = motion
-    if _is(robot, mujoco.mjtIntegrator.mjINT_RK4):
-        return np.zeros_like(q)
     h = robot.model.opt.timestep
+    if _is(robot, mujoco.mjtIntegrator.mjINT_RK4):
+        kp, kv = _of_bias(robot, POSITION), actuator_damping(robot)
+        return np.asarray(h / 2 * (kp * qd + kv * qdd) + h**2 / 6 * (kp * qdd + kv * jerk))
     side = 1 if _is(robot, mujoco.mjtIntegrator.mjINT_IMPLICIT) else -1
     v, a = qd + side * h / 2 * qdd + h**2 / 6 * jerk, qdd + h**2 / 12 * snap
     return np.asarray(inverse_dynamics(robot, q, v, a) - inverse_dynamics(robot, q, qd, qdd) + h * _at_the_end(robot) * a)
@@ -61,13 +62,22 @@ def _at_the_end(robot: Robot) -> Array:
     return np.zeros(robot.n) if explicit else np.array(model.dof_damping)
 
 
+def acting_late(robot: Robot) -> float:
+    """How much later than logged the torques of `torque_of_steps` act [s]."""
+    return float(robot.model.opt.timestep / 2) if _is(robot, mujoco.mjtIntegrator.mjINT_RK4) else 0.0
+
+
 def actuator_damping(robot: Robot) -> Array:
     """Return kv of the actuators of each joint, such as `position` and `velocity`, shape (joint,) [N m s/rad, N s/m]."""
+    return _of_bias(robot, VELOCITY)
+
+
+def _of_bias(robot: Robot, place: int) -> Array:
     model, found = robot.model, np.zeros(robot.n)
     joint, affine = int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtBias.mjBIAS_AFFINE)
     for a in range(model.nu):
         if model.actuator_trntype[a] == joint and model.actuator_biastype[a] == affine:
-            found[model.actuator_trnid[a, 0]] -= model.actuator_biasprm[a, VELOCITY] * model.actuator_gear[a, 0] ** 2
+            found[model.actuator_trnid[a, 0]] -= model.actuator_biasprm[a, place] * model.actuator_gear[a, 0] ** 2
     return found
 
 

@@ -9,7 +9,6 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from idbench.identify.arrays import TINY
 from idbench.identify.data.motion_log import MotionLog
 from idbench.identify.plugins import did_you_mean
 from idbench.sim.errors import ScenarioError
@@ -115,8 +114,8 @@ Apply = Callable[[_Joint], None]
 """Puts a fault into the log of a joint."""
 
 
-class Kind(NamedTuple):
-    """A kind of fault."""
+class Flaw(NamedTuple):
+    """A kind of fault, and what the doctor calls it."""
 
     what: str
     """What is wrong."""
@@ -243,7 +242,7 @@ def _loaded(x: _Joint, model: Any) -> None:
 def _longer(x: _Joint, model: Any) -> None:
     body = model.jnt_bodyid[x.j]
     way = np.array(model.body_pos[body])
-    model.body_pos[body] = way + x.size * way / max(float(np.linalg.norm(way)), TINY)
+    model.body_pos[body] = way + x.size * way / (float(np.linalg.norm(way)) or 1.0)
 
 
 def _bent(x: _Joint, model: Any) -> None:
@@ -252,93 +251,93 @@ def _bent(x: _Joint, model: Any) -> None:
     model.jnt_axis[x.j] = np.cos(x.size) * axis + np.sin(x.size) * np.cross(other, axis)
 
 
-FAULTS: Mapping[str, Kind] = {
-    "gain": Kind("the torque is too large, by a share", "1", ("gain", "torque"), _torque(lambda x: x.size * x.tau)),
-    "sign": Kind("the torque has the other sign", "", ("sign", "torque"), _torque_is(lambda x: -x.tau)),
-    "position-sign": Kind("the position has the other sign", "", ("sign", "position"), _position_is(lambda x: -x.q)),
-    "axis-sign": Kind("the axis points the other way", "", ("sign", "joint"), _turned),
-    "offset": Kind("the torque has an offset", "N m", ("offset", "torque"), _torque(lambda x: x.size)),
-    "drift": Kind("the torque drifts", "N m/s", ("drift", "torque"), _torque(lambda x: x.size * x.t)),
-    "saturation": Kind(
+FAULTS: Mapping[str, Flaw] = {
+    "gain": Flaw("the torque is too large, by a share", "1", ("gain", "torque"), _torque(lambda x: x.size * x.tau)),
+    "sign": Flaw("the torque has the other sign", "", ("sign", "torque"), _torque_is(lambda x: -x.tau)),
+    "position-sign": Flaw("the position has the other sign", "", ("sign", "position"), _position_is(lambda x: -x.q)),
+    "axis-sign": Flaw("the axis points the other way", "", ("sign", "joint"), _turned),
+    "offset": Flaw("the torque has an offset", "N m", ("offset", "torque"), _torque(lambda x: x.size)),
+    "drift": Flaw("the torque drifts", "N m/s", ("drift", "torque"), _torque(lambda x: x.size * x.t)),
+    "saturation": Flaw(
         "torques end at a share of the largest", "1", ("saturation", "torque"),
         _torque_is(lambda x: np.clip(x.tau, -x.size * _largest(x), x.size * _largest(x))),
     ),
-    "falling-constant": Kind(
+    "falling-constant": Flaw(
         "currents say more than the torque constant still gives, by a share at the largest", "1", ("saturation", "torque"),
         _torque_is(lambda x: x.tau / (1 - x.size * (x.tau / _largest(x)) ** 2)),
     ),
-    "dead-band": Kind(
+    "dead-band": Flaw(
         "small torques are not logged", "N m", ("dead_band", "torque"), _torque(lambda x: -np.clip(x.tau, -x.size, x.size))
     ),
-    "delay": Kind(
+    "delay": Flaw(
         "the torque is logged late", "s", ("delay", "torque"),
         _torque_is(lambda x: np.interp(x.t - x.size, x.t, x.tau)),
     ),
-    "position-delay": Kind(
+    "position-delay": Flaw(
         "the position is logged late", "s", ("delay", "position"),
         _position_is(lambda x: np.interp(x.t - x.size, x.t, x.q)),
     ),
-    "zero": Kind("the zero of the position is off", "rad", ("zero", "position"), _position_is(lambda x: x.q + x.size)),
-    "scale": Kind("positions too large, by a share", "1", ("scale", "position"), _position_is(lambda x: x.q + x.size * x.q)),
-    "eccentric": Kind(
+    "zero": Flaw("the zero of the position is off", "rad", ("zero", "position"), _position_is(lambda x: x.q + x.size)),
+    "scale": Flaw("positions too large, by a share", "1", ("scale", "position"), _position_is(lambda x: x.q + x.size * x.q)),
+    "eccentric": Flaw(
         "the encoder is eccentric", "rad", ("eccentric", "position"), _position_is(lambda x: x.q + x.size * np.sin(x.q))
     ),
-    "degrees": Kind("the position is in degrees", "", ("unit", "joint"), _position_is(lambda x: np.degrees(x.q))),
-    "rotor": Kind("a rotor more", "kg m^2", ("rotor", "drive"), _torque(lambda x: x.size * x.qdd)),
-    "coupled-rotor": Kind("the rotor of the next joint turns with this one", "kg m^2", ("coupled_rotor", "drive"), _coupled),
-    "spring": Kind("a spring", "N m/rad", ("spring", "drive"), _torque(lambda x: x.size * x.angle)),
-    "load-friction": Kind(
+    "degrees": Flaw("the position is in degrees", "", ("unit", "joint"), _position_is(lambda x: np.degrees(x.q))),
+    "rotor": Flaw("a rotor more", "kg m^2", ("rotor", "drive"), _torque(lambda x: x.size * x.qdd)),
+    "coupled-rotor": Flaw("the rotor of the next joint turns with this one", "kg m^2", ("coupled_rotor", "drive"), _coupled),
+    "spring": Flaw("a spring", "N m/rad", ("spring", "drive"), _torque(lambda x: x.size * x.angle)),
+    "load-friction": Flaw(
         "friction that grows with the load, by a share of it", "1", ("load", "friction"),
         _torque(lambda x: x.size * np.abs(x.load) * np.sign(x.qd)),
     ),
-    "stribeck": Kind(
+    "stribeck": Flaw(
         "more friction near rest", "N m", ("velocity", "friction"),
         _torque(lambda x: x.size * np.exp(-((x.qd / (SLOW * x.qd.std())) ** 2)) * np.sign(x.qd)),
     ),
-    "asymmetry": Kind(
+    "asymmetry": Flaw(
         "friction that differs by direction", "N m s/rad", ("asymmetry", "friction"), _torque(lambda x: x.size * np.abs(x.qd))
     ),
-    "warming": Kind(
+    "warming": Flaw(
         "friction that falls to the end, by a share", "1", ("warming", "friction"),
         _torque(lambda x: -x.size * x.t / x.t[-1] * x.friction),
     ),
-    "hysteresis": Kind("friction turns over a distance (Dahl)", "N m", ("hysteresis", "friction"), _torque(_presliding)),
-    "cogging": Kind("cogging of so many waves", "N m", ("cogging", "drive"), _torque(lambda x: x.size * x.wave)),
-    "commutation": Kind(
+    "hysteresis": Flaw("friction turns over a distance (Dahl)", "N m", ("hysteresis", "friction"), _torque(_presliding)),
+    "cogging": Flaw("cogging of so many waves", "N m", ("cogging", "drive"), _torque(lambda x: x.size * x.wave)),
+    "commutation": Flaw(
         "a ripple of the torque constant of so many waves, by a share", "1", ("commutation", "drive"),
         _torque(lambda x: x.size * x.wave * (x.load + x.friction)),
     ),
-    "backlash": Kind(
+    "backlash": Flaw(
         "play, with the encoder at the motor", "rad", ("backlash", "drive"),
         _position_is(lambda x: x.q + x.size / 2 * np.tanh(STEEP * x.load / x.load.std())),
     ),
-    "elasticity": Kind(
+    "elasticity": Flaw(
         "an elastic gear, with the encoder at the motor", "rad/(N m)", ("elasticity", "drive"),
         _position_is(lambda x: x.q + x.size * x.load),
     ),
-    "push": Kind("a push", "N m", ("collision", "torque"), _torque(lambda x: x.size)),
-    "unlogged": Kind(
+    "push": Flaw("a push", "N m", ("collision", "torque"), _torque(lambda x: x.size)),
+    "unlogged": Flaw(
         "noise in the place of the torque", "N m", ("missing_torque", "torque"),
         _torque_is(lambda x: x.size * x.record.rng.standard_normal(len(x.tau))),
     ),
-    "exchanged-torques": Kind("torque exchanged with that of the next joint", "", ("exchanged", "torque"), _exchanged("tau")),
-    "exchanged-positions": Kind("position exchanged with that of the next", "", ("exchanged", "position"), _exchanged("q")),
-    "exchanged": Kind("columns exchanged with those of the next joint", "", ("exchanged", "joint"), _exchanged("q", "tau")),
-    "length": Kind("the joint is farther from the one before", "m", ("length", "link"), _of_model(_longer)),
-    "axis": Kind("the axis is turned", "rad", ("axis", "link"), _of_model(_bent)),
-    "payload": Kind("a payload 0.1 m from the last link's frame", "kg", ("payload", "link"), _of_model(_loaded), whole=True),
-    "tilt": Kind("the base is tilted", "rad", ("gravity", "base"), _of_model(_tilted), whole=True),
-    "compensated": Kind("gravity is not in the torques", "", ("gravity", "base"), _of_model(_weightless), whole=True),
-    "base-motion": Kind(
+    "exchanged-torques": Flaw("torque exchanged with that of the next joint", "", ("exchanged", "torque"), _exchanged("tau")),
+    "exchanged-positions": Flaw("position exchanged with that of the next", "", ("exchanged", "position"), _exchanged("q")),
+    "exchanged": Flaw("columns exchanged with those of the next joint", "", ("exchanged", "joint"), _exchanged("q", "tau")),
+    "length": Flaw("the joint is farther from the one before", "m", ("length", "link"), _of_model(_longer)),
+    "axis": Flaw("the axis is turned", "rad", ("axis", "link"), _of_model(_bent)),
+    "payload": Flaw("a payload 0.1 m from the last link's frame", "kg", ("payload", "link"), _of_model(_loaded), whole=True),
+    "tilt": Flaw("the base is tilted", "rad", ("gravity", "base"), _of_model(_tilted), whole=True),
+    "compensated": Flaw("gravity is not in the torques", "", ("gravity", "base"), _of_model(_weightless), whole=True),
+    "base-motion": Flaw(
         "the base moves at 3 Hz", "m/s^2", ("base_motion", "base"),
         _of_model(_shaken, lambda t: np.sin(2 * np.pi * SHAKEN * t)), whole=True,
     ),
-    "rate": Kind("the motion is faster than the times say, by a share", "1", ("rate", "clock"), _faster, whole=True),
-    "clock-drift": Kind(
+    "rate": Flaw("the motion is faster than the times say, by a share", "1", ("rate", "clock"), _faster, whole=True),
+    "clock-drift": Flaw(
         "clocks of positions and torques drift apart", "s/s", ("clock_drift", "clock"),
         _torque_is(lambda x: np.interp(x.t * (1 - x.size), x.t, x.tau)),
     ),
-    "dropouts": Kind("samples that repeat the one before, a share", "1", ("dropouts", "log"), _dropped, whole=True),
+    "dropouts": Flaw("samples that repeat the one before, a share", "1", ("dropouts", "log"), _dropped, whole=True),
 }  # fmt: skip
 """Every fault that a scenario can inject."""
 

@@ -9,6 +9,7 @@ from idbench.experiments.program import program
 from idbench.experiments.results.page import Page
 from idbench.experiments.results.writing import require_free, write_text
 from idbench.identify.plugins import PluginTable
+from idbench.sim.scenario.faults import FAULTS
 from idbench.sim.scenario.scenario_file import designed, load, names, to_toml
 
 
@@ -21,9 +22,14 @@ def list_plugins(options: List) -> None:
             grid.add_row(f"  {name}", Text(table.summary(name)))
         added = f" (entry points: idbench.{table.point})" if isinstance(table, PluginTable) else ""
         page.print(Text(f"{table.point}{added}", style="bold"), grid, sep="\n")
+    grid = Table.grid(padding=(0, 2))
+    for name, flaw in FAULTS.items():
+        grid.add_row(f"  {name}", Text(f"{flaw.what}{f' [{flaw.unit}]' if flaw.unit else ''}"))
+    page.print(Text("faults ([[fault]] of a scenario)", style="bold"), grid, sep="\n")
     for conflict in plugin_conflicts():
         page.print(Text(f"warning: {conflict}"), soft_wrap=True)
     page.found |= {table.point: {name: table.summary(name) for name in table} for table in TABLES}
+    page.found["faults"] = {name: flaw.what for name, flaw in FAULTS.items()}
     page.close()
 
 

@@ -16,7 +16,7 @@ from idbench.experiments.identification.log_warnings import warnings_of_log
 from idbench.experiments.identification.robot_model import SCARA
 from idbench.experiments.identification.scenario_run import ScenarioRun
 from idbench.experiments.inputs import files_of
-from idbench.experiments.judgement.warnings import FILE, LOG, warnings_of_robot
+from idbench.experiments.judgement.warnings import FILE, LOG, MODEL, warnings_of_robot
 from idbench.experiments.plugin_tables import plugin_conflicts
 from idbench.experiments.program import program
 from idbench.experiments.reports.estimates import models_in_full
@@ -82,4 +82,5 @@ def _print_run(page: Page, ran: ScenarioRun, *, verbose: bool) -> None:
     if ran.rejection is not None:
         page.print(Text(ran.rejection.words(ran.run.robots[0].joints, ran.scenario.wdyn)), soft_wrap=True)
     of_log = warnings_of_log(ran.run.alone(), ran.fit.robot_model.tree)
-    page.warn({LOG: of_log, FILE: [*warnings_of_robot(ran.run.robots[0]), *plugin_conflicts()]})
+    causes = [cause.advice for cause in ran.fit.diagnosis or ()]
+    page.warn({LOG: of_log, FILE: [*warnings_of_robot(ran.run.robots[0]), *plugin_conflicts()], MODEL: causes})
