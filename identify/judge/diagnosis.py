@@ -42,13 +42,12 @@ def diagnosed(problem: Problem, X: Array) -> tuple[Suspect, ...]:
     problem.require_rows("mistakes are looked for by rows, and ")
     small = small_mistakes(problem, X)
     whole = whole_mistakes(_thinned(problem.explicit), small[0] if small else None)
-    if whole and small and (whole[0].cause, whole[0].joint) == (small[0].cause, small[0].joint):
-        there = {(each.cause, each.joint) for each in whole}
-        first = replace(whole[0], sigma=small[0].sigma, explained=small[0].explained)
-        return (first, *whole[1:], *(each for each in small if (each.cause, each.joint) not in there))
-    if whole:
-        return (*whole, *_besides(problem.explicit, whole))
-    return tuple(small) or tuple(_impossible_signs(problem.explicit, X))  # of a wrong model friction may be negative, too
+    if not whole:
+        return tuple(small) or tuple(_impossible_signs(problem.explicit, X))  # of a wrong model friction may be negative, too
+    if small and (whole[0].cause, whole[0].joint) == (small[0].cause, small[0].joint):
+        whole[0] = replace(whole[0], sigma=small[0].sigma, explained=small[0].explained)
+    there = {(each.cause, each.joint) for each in whole}
+    return (*whole, *(each for each in _besides(problem.explicit, whole) if (each.cause, each.joint) not in there))
 
 
 def _besides(problem: Problem, whole: Sequence[Suspect]) -> Sequence[Suspect]:
