@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from idbench.sim.robot.inverse_dynamics import coulomb_torque, inverse_dynamics
-from idbench.sim.robot.time_steps import actuator_damping, apparent_rotor_inertia, torque_of_steps
+from idbench.sim.robot.time_steps import acting_late, actuator_damping, apparent_rotor_inertia, torque_of_steps
 
 H = 0.002
 
@@ -58,6 +58,21 @@ def test_torques_of_every_integrator_become_those_of_the_motion(load_robot, inte
     assert (before > 10 * off).all()
 
 
+def test_a_control_of_runge_kutta_acts_in_the_middle_of_its_step_with_what_it_meets_on_the_way(load_robot):
+    """Torques of the motion half a step later, by the mean of two instants; positions are exact to the fourth order."""
+    robot = load_robot(ARM.format("RK4", ""))
+    q, tau = simulated(robot.model)
+    motion = [q]
+    for _ in range(4):
+        motion.append(slope(motion[-1]))
+    inner = slice(500, -20)
+    expected = inverse_dynamics(robot, *motion[:3]) + coulomb_torque(robot, motion[1])
+    expected = (expected + np.roll(expected, -1, axis=0)) / 2
+    off, before = (np.sqrt(np.mean((x - expected)[inner] ** 2, axis=0)) for x in (tau - torque_of_steps(robot, motion), tau))
+    assert acting_late(robot) == H / 2
+    assert (off < 0.05 * before).all()
+
+
 @pytest.mark.parametrize(
     ("integrator", "flag", "kv", "half"),
     [
@@ -65,7 +80,7 @@ def test_torques_of_every_integrator_become_those_of_the_motion(load_robot, inte
         ("implicit", "", 1, 1),
         ("Euler", "", 0, 1),
         ("Euler", 'eulerdamp="disable"', 0, -1),
-        ("RK4", "", 0, 0),
+        ("RK4", "", 0.5, 0),
     ],
 )
 def test_what_seems_inertia_is_that_of_the_damping_at_the_end_of_a_step(load_robot, integrator, flag, kv, half):
