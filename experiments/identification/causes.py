@@ -116,7 +116,10 @@ WORDINGS: Mapping[tuple[str, str], Wording] = {
     ("exchanged", "position"): Wording(
         "its position is exchanged with that of {other}", by="exchange the columns of its position and that of {other}"
     ),
-    ("exchanged", "joint"): Wording("its columns are exchanged with those of {other}", "--joints {joints}"),
+    ("exchanged", "joint"): Wording(
+        "its columns are exchanged with those of {other}",
+        by="exchange their names in the header; where columns are numbered, --joints {joints}",
+    ),
     ("missing_torque", "torque"): Wording(
         "its torque does not follow the motion: it was not logged, and its rows are left out", by="log it"
     ),

@@ -99,6 +99,8 @@ class TorqueGains:
             every = sorted({tuple(each[agree[j] & known]) for j in each[known]})
             groups = [group for group in every if len(group) == max(map(len, every))]
         found = [self._without(np.isin(each, group) | ~known, np.where(known & (side * a < 0), -1.0, 1.0)) for group in groups]
+        if self.scaled:  # what agrees is one factor of all, as of a unit
+            found = [_alike(factors, sigma) for factors in found]
         return [factors for factors in found if (factors != 1).any()]
 
     def _without(self, right: npt.NDArray[np.bool_], signs: Array) -> Array:
@@ -228,6 +230,16 @@ class TorqueGains:
         g = (np.linalg.svd(A / size, full_matrices=False)[2][-1] / size)[W.shape[-1] :]
         a = np.divide(1.0, g, out=np.ones(self.n), where=np.abs(g) > TINY)
         return np.asarray(np.where(self.free, a / np.median(np.abs(a)), self.start))
+
+
+def _alike(factors: Array, sigma: Array) -> Array:
+    """Factors as one, the mean of their logarithms by their weights, where they agree within their standard deviations."""
+    wrong = factors != 1
+    if not wrong.any() or (factors <= 0).any():
+        return factors
+    size, weight = np.log(factors[wrong]), 1 / np.maximum(sigma[wrong], TINY) ** 2
+    mean = float(size @ weight / weight.sum())
+    return np.where(wrong, np.exp(mean), factors) if (np.abs(size - mean) <= SAME * sigma[wrong]).all() else factors
 
 
 def mean_inertias(problem: Problem, X: Array, C: Array | None = None) -> Array:

@@ -101,11 +101,14 @@ def _require_sign(robot: LoadedRobot, step: Array, sigma: Array, problem: Proble
         x for p, x in zip(problem.basis.parameters, fit.X, strict=True) if p.kind == "Coulomb friction" and wrong[p.joint]
     ]
     why = (
-        "do their currents have the wrong sign (positive must speed up a positive motion)? Read them with a negative --gain"
+        "do their currents have the wrong sign (positive must speed up a positive motion)? Read them with a negative --gain."
         if friction and max(friction) < 0
         else "are the logs without and with the payload exchanged, or of different signs or units?"
     )
-    raise IdentificationError(f"the gains of {', '.join(_names(robot, wrong))} come out below zero: {why}")
+    raise IdentificationError(
+        f"the gains of {', '.join(_names(robot, wrong))} come out below zero: {why} Or does the payload, as it is known, show "
+        "too little of them? Then take a heavier one, or say where its mass is (--at)"
+    )
 
 
 def read_with(log: MotionLog, ratio: Array) -> MotionLog:
