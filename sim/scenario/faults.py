@@ -188,6 +188,10 @@ def _faster(x: _Joint) -> None:
     x.record.fs /= 1 + x.size
 
 
+def _drifting(x: _Joint) -> None:
+    x.record.tau = np.array([np.interp(x.t * (1 - x.size), x.t, tau) for tau in x.record.tau.T]).T
+
+
 def _coupled(x: _Joint) -> None:
     """The rotor of the next joint turns with this one, I (qdd_j + qdd_k) of both; it was one of the next alone."""
     k, qdd = (x.j + 1) % x.record.q.shape[1], x.record.true[2]
@@ -334,8 +338,7 @@ FAULTS: Mapping[str, Flaw] = {
     ),
     "rate": Flaw("the motion is faster than the times say, by a share", "1", ("rate", "clock"), _faster, whole=True),
     "clock-drift": Flaw(
-        "clocks of positions and torques drift apart", "s/s", ("clock_drift", "clock"),
-        _torque_is(lambda x: np.interp(x.t * (1 - x.size), x.t, x.tau)),
+        "clocks of positions and torques drift apart", "s/s", ("clock_drift", "clock"), _drifting, whole=True
     ),
     "dropouts": Flaw("samples that repeat the one before, a share", "1", ("dropouts", "log"), _dropped, whole=True),
 }  # fmt: skip

@@ -82,7 +82,7 @@ def studied(name, seed, laws, masked):
     )
     request = Request(robot_model, models=("explicit",), method=Method.named(estimator="WLS"))
     if not masked:
-        request = replace(request, method=(replace(request.processing, mask=NoMask()), request.method.method.estimator))
+        request = request.with_chain(replace(request.method.chain, mask=NoMask()))
     auto, _ = chosen_friction(request, (fitted,))
     rms = []
     for each in (request, auto):
