@@ -282,6 +282,8 @@ class Cause:
     def _of_gain(self, size: str) -> str:
         """A wrong gain in words: in per cent, or as a factor where that is large."""
         factor = 1 + self.suspect.size[0]
+        if factor < 0:
+            return f"the torque has the other sign and is {-factor:.4g} times too large"
         if 1 / LARGE < factor < LARGE:
             return f"torque constant {size} too {'large' if factor > 1 else 'small'}"
         unit = (

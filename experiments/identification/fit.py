@@ -75,7 +75,8 @@ class Fit:
         """What is wrong, as residuals show it; None where the rows do not allow the tests."""
         try:
             suspects = diagnosed(self.problem, self.estimates[self.leading].X)
-            wrong = contradicted(self.request, self.problem, self.logs.fitted)
+            unknown = () if suspects else tuple(something_else(self.motion_shares))
+            wrong = contradicted(self.request, self.problem, self.logs.fitted) if suspects or unknown else None
         except (IdentificationError, np.linalg.LinAlgError):  # an estimate is not lost because its tests are
             return None
         # Wrong gains, and something held that is wrong by the same factor, explain the same.
@@ -84,8 +85,7 @@ class Fit:
             suspects = tuple(replace(each, alternatives=(*each.alternatives, other)) for each in suspects)
         elif wrong:
             suspects = (wrong[0],)
-        elif not suspects:
-            suspects = tuple(something_else(self.motion_shares))
+        suspects = suspects or unknown
         log, gains, stated = self.logs.fitted[0], self.logs.gains, wrong[1] if wrong else ""
         return causes_of((*self.silent, *suspects), self.robot_model, log, gains, stated)
 

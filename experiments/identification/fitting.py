@@ -21,6 +21,7 @@ from idbench.identify import (
     Problem,
     attempt_each,
 )
+from idbench.identify.arrays import TINY
 from idbench.identify.data.motion_log import never_logged
 from idbench.identify.judge.diagnosis import diagnosed, silent_joint, still_joints, unlogged, unrelated_joint
 from idbench.identify.judge.mask_choice import suited_reach
@@ -32,6 +33,10 @@ SPOILT = 0.5
 """Share of the error of the other joints that is left without the zeros of one, if its torque was not logged. Of a joint that
 nobody drives zeros are right: without them others are not predicted better."""
 
+
+MISSED = 0.3
+"""Share of a torque like noise that the others say it should have at least, if it was not logged: a joint so light that noise
+drowns its torque has less."""
 
 BESIDE = "standard+load"  # Laws beside the smooth functions
 
@@ -98,15 +103,22 @@ def _silent(found: Fit) -> Suspect | None:
     problem, X = found.problem.explicit, found.estimates[found.leading].X
     if (suspect := silent_joint(problem, X)) is not None:
         return suspect
-    if (noise := unrelated_joint(problem)) is not None:
-        return unlogged(noise)
-    for j in still_joints(problem):
+    noise = unrelated_joint(problem)
+    for j in (*(() if noise is None else (noise,)), *still_joints(problem)):
         logs = found.logs.without_torque(j)
         quiet = _shown(found.request, logs, found.request.problem(logs.fitted))
         before, after = _errors(found, quiet) if quiet.estimates else (0.0, 0.0)
-        if after < SPOILT * before:
+        if after < SPOILT * before or (j == noise and quiet.estimates and _expected(quiet, problem, j) > MISSED):
             return unlogged(j)
     return None
+
+
+def _expected(quiet: Fit, problem: Problem, j: int) -> float:
+    """Torque of a joint that the rows of the others predict, over what was logged, rms."""
+    known = dict(zip(quiet.basis.names, quiet.estimates[quiet.leading].X.tolist(), strict=True))
+    own = problem.rows.group == j
+    predicted = problem.rows.W[own] @ np.array([known.get(name, 0.0) for name in problem.names])
+    return float(np.linalg.norm(predicted) / max(float(np.linalg.norm(problem.rows.Y[own])), TINY))
 
 
 def _errors(before: Fit, after: Fit) -> tuple[float, float]:

@@ -79,7 +79,8 @@ class SimulatedLogs:
         )
         instantaneous = log.torque.delay == 0 and not log.torque.lags
         late = acting_late(self.robot_model.robot)
-        torque = replace(log.torque, meaning="instantaneous", period=None, delay=late) if instantaneous else log.torque
+        torque = replace(log.torque, delay=log.torque.delay + late)
+        torque = replace(torque, meaning="instantaneous", period=None) if instantaneous else torque
         return replace(log, tau=tau, torque=torque).part(edge, log.samples - edge)
 
     def _evident(self, logs: Sequence[MotionLog], request: Request) -> bool:
@@ -109,6 +110,12 @@ class SimulatedLogs:
             if self.inertia.any()
             else "takes nothing at the end of a step; what half a step makes of velocities"
         )
+        if late := acting_late(robot):
+            return (
+                f"a log of MuJoCo's simulation of the robot's file, {stated}: by RK4 with a step of "
+                f"{robot.model.opt.timestep:g} s actuators act on joints as these move within it, as if rotors were larger by "
+                f"{' '.join(each)} {unit}; that is taken out, and torques act {1e3 * late:g} ms later than logged"
+            )
         instants = "" if read.channel.delay else ", and torques are those at the instants of the positions"
         return (
             f"a log of MuJoCo's simulation of the robot's file, {stated}: {integrator_name(robot)} with a step of "

@@ -40,12 +40,12 @@ def conclusion(judgement: Judgement, warnings: Mapping[str, Sequence[str]]) -> C
     """
     verdict = judgement.verdict
     word = verdict.word if verdict else ""
-    proved = any(any(cause.suspect.held_out) for cause in judgement.fit.diagnosis or ())
+    causes = judgement.fit.diagnosis or ()
+    proved = any(any(cause.suspect.held_out) for cause in causes)
     doubts = map(noted, warnings.get(LOG, ()))
     of_log = next(
         (str(doubt) for doubt in doubts if doubt.about == JUMPS or (doubt.option and not proved and word != "good")), ""
     )
-    causes = judgement.fit.diagnosis or ()
     step = of_log or _next(judgement, warnings)
     if word == "poor" and judgement.fit.robot_model.assumed:
         step = f"{ASSUMED}: --robot FILE names another"

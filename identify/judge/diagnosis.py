@@ -1,6 +1,6 @@
 """What is wrong with a fit: large mistakes and small ones; and which torques were not logged."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -42,20 +42,20 @@ def diagnosed(problem: Problem, X: Array) -> tuple[Suspect, ...]:
     problem.require_rows("mistakes are looked for by rows, and ")
     small = small_mistakes(problem, X)
     whole = whole_mistakes(_thinned(problem.explicit), small[0] if small else None)
-    if not whole:
-        return tuple(small) or tuple(_impossible_signs(problem.explicit, X))  # of a wrong model friction may be negative, too
-    if small and (whole[0].cause, whole[0].joint) == (small[0].cause, small[0].joint):
+    if whole and small and (whole[0].cause, whole[0].joint) == (small[0].cause, small[0].joint):
         whole[0] = replace(whole[0], sigma=small[0].sigma, explained=small[0].explained)
+    elif whole and not whole[0].gains:
+        return tuple(whole)
+    mended = problem.explicit
+    if whole and whole[0].gains:  # the residuals show others once these are right
+        mended = mended.with_logs([replace(log, tau=log.tau * np.array(whole[0].gains[0])) for log in problem.logs])
+        X = mended.factors.fit(2).X
+        small = small_mistakes(mended, X)
     there = {(each.cause, each.joint) for each in whole}
-    return (*whole, *(each for each in _besides(problem.explicit, whole) if (each.cause, each.joint) not in there))
-
-
-def _besides(problem: Problem, whole: Sequence[Suspect]) -> Sequence[Suspect]:
-    """Small mistakes beside wrong gains of the torques, which residuals show once these are right."""
-    if not whole[0].gains:
-        return ()
-    mended = problem.with_logs([replace(log, tau=log.tau * np.array(whole[0].gains[0])) for log in problem.logs])
-    return small_mistakes(mended, mended.factors.fit(2).X)
+    found = [*whole, *(each for each in small if (each.cause, each.joint) not in there)]
+    # Of a joint that something else is wrong with, friction may be negative, too.
+    doubted = {each.joint for each in found}
+    return (*(sign for sign in _impossible_signs(mended, X) if sign.joint not in doubted), *found)
 
 
 def _impossible_signs(problem: Problem, X: Array) -> Iterator[Suspect]:

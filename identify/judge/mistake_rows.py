@@ -17,6 +17,7 @@ from idbench.identify.judge.mistakes import (
     COGGING,
     COLLISION,
     COMMUTATION,
+    ECCENTRIC,
     FROM_AN_INSTANT,
     GAIN,
     OF_JOINTS,
@@ -24,12 +25,12 @@ from idbench.identify.judge.mistakes import (
     Mistake,
 )
 from idbench.identify.judge.ripples import WAVES, likely_waves
+from idbench.identify.judge.stretches import held_torque
 from idbench.identify.signals.signals import State
 
 RATE = 10.0  # Instants at which columns are made, in multiples of the operator's cut-off: they are smooth where rows count
 USUAL = 5.0  # Cut-off of an operator that states none [Hz]
 AT_ONCE = 2_000_000  # Values of columns that are filtered at once: some 16 MB
-OF_HINGES = frozenset({"eccentric"})  # Mistakes of what turns
 INSTANTS = 12  # Instants from which on something may have changed: a twelfth of a log apart
 PUSH = 0.3  # Time [s] that a collision takes, about: a robot that hits something stops, or gives way
 SLOWEST = 0.5  # Least frequency [Hz] at which a base is taken to move by itself
@@ -73,8 +74,7 @@ class MistakeRows:
     def every(self) -> list[Candidate]:
         """Return the mistakes of joints and of the robot, and those that are looked for from an instant on."""
         joints, robot = range(self.basis.n), (None,)
-        hinges = [j for j in joints if j not in self.basis.slides]
-        asked = [(m, j) for m in OF_JOINTS if m is not GAIN for j in (hinges if m.cause in OF_HINGES else joints)] + [
+        asked = [(m, j) for m in OF_JOINTS if m is not GAIN for j in (self._hinges if m is ECCENTRIC else joints)] + [
             (m, j) for m in (*OF_ROBOT, *FROM_AN_INSTANT) for j in robot
         ]
         found = [*self._gains(), *self._made(asked)]
@@ -128,10 +128,9 @@ class MistakeRows:
         if self.parts[0].signals.log.poses:
             return
         for mistake, sizes in (COGGING, [np.ones_like(x) for x in self._torques]), (COMMUTATION, self._torques):
-            for j, k in likely_waves(self.parts, e, sizes, self._cutoff):
-                if j not in self.basis.slides:
-                    plain = np.concatenate([_wave(part, j, k, x[j]) for part, x in zip(self.parts, sizes, strict=True)])
-                    yield self._candidate(mistake._replace(setting=float(k)), j, plain)
+            for j, k in likely_waves(self.parts, e, sizes, self._cutoff, self._hinges):
+                plain = np.concatenate([_wave(part, j, k, x[j]) for part, x in zip(self.parts, sizes, strict=True)])
+                yield self._candidate(mistake._replace(setting=float(k)), j, plain)
 
     @cached_property
     def _torques(self) -> list[Array]:
@@ -142,11 +141,15 @@ class MistakeRows:
     def looks(self) -> int:
         """How many collisions, motions of the base and ripples are looked for."""
         kinds, count = self.parts[0].rows.kinds, len(self._time)
-        return count + 3 * count // (2 * kinds) + 2 * self.basis.n * len(WAVES)
+        return count + 3 * count // (2 * kinds) + 2 * len(self._hinges) * len(WAVES)
 
     @property
     def _cutoff(self) -> float:
         return getattr(self.parts[0].problem.own_chain.operator, "cutoff", None) or USUAL
+
+    @property
+    def _hinges(self) -> list[int]:
+        return [j for j in range(self.basis.n) if j not in self.basis.slides]
 
     @property
     def _step(self) -> float:
@@ -209,18 +212,13 @@ class MistakeRows:
         return [[next(made) for _ in each] for each in columns]
 
 
-def held_torque(part: LogRows) -> Array:
-    """Return the rows of the torque of parameters that are held, and of laws about their shapes: measured ones less Y."""
-    to_rows = part.rows.maps[0]
-    return np.asarray(to_rows.measurement(to_rows.signals.torque.mean) - part.rows.Y)
-
-
 def _wave(part: LogRows, j: int, k: int, size: Array) -> Array:
     """Return the rows of sine and cosine of k waves a turn in the torque of a joint, shape (r, 2)."""
-    to_rows, q = part.rows.maps[0], part.signals.state.q
-    whole = np.zeros((2, *q.shape))
-    whole[:, j] = size * np.sin(k * q[j]), size * np.cos(k * q[j])
-    return to_rows.measurement(whole).T
+    to_rows, q = part.rows.maps[0], part.signals.state.q[j]
+    wave = to_rows.kernel.apply(to_rows.inside[j] * size * np.stack([np.sin(k * q), np.cos(k * q)]))
+    found = np.zeros((len(part.rows.time), 2))
+    found[part.rows.group == j] = (to_rows.outside[j] * wave).T
+    return found
 
 
 def _filtered(part: LogRows, columns: Sequence[Rows], t: Array, thin: int) -> Iterator[Array]:

@@ -38,7 +38,7 @@ from idbench.identify.judge.mistake_columns import (
     whole_rows,
 )
 
-RARE = 3
+RARE = 3  # Rank of what few robots have: of causes that explain the same, the others are more likely
 
 
 class Mistake(NamedTuple):
@@ -66,19 +66,21 @@ class Mistake(NamedTuple):
 
 GAIN = Mistake("gain", of_joint(lambda m, j: m.torque[j]), most=1.0, left=1e-6, rank=0)  # Torques that are all too large
 
+ECCENTRIC = Mistake("eccentric", eccentric, "rad", "position", most=0.5, rank=RARE)  # Of hinges
+
 OF_JOINTS: tuple[Mistake, ...] = (
     GAIN,
     Mistake("offset", of_joint(lambda m, _: np.ones_like(m.t)), "N m", rank=1),
-    Mistake("drift", of_joint(lambda m, _: m.t - m.t[0]), "N m/s", rank=3),
-    Mistake("saturation", of_joint(lambda m, j: -(m.torque[j] ** 3)), "1/(N m)^2", rank=3),
-    Mistake("dead_band", of_joint(lambda m, j: -np.sign(m.torque[j])), "N m", rank=3),
+    Mistake("drift", of_joint(lambda m, _: m.t - m.t[0]), "N m/s", rank=RARE),
+    Mistake("saturation", of_joint(lambda m, j: -(m.torque[j] ** 3)), "1/(N m)^2", rank=RARE),
+    Mistake("dead_band", of_joint(lambda m, j: -np.sign(m.torque[j])), "N m", rank=RARE),
     Mistake("delay", of_joint(late), "s", rank=1),
     Mistake("delay", late_position, "s", "position"),
     Mistake("zero", position_zero, "rad", "position", most=0.5),
     Mistake("scale", position_scale, "1", "position", most=0.3),
-    Mistake("eccentric", eccentric, "rad", "position", most=0.5, rank=3),
+    ECCENTRIC,
     Mistake("rotor", of_joint(lambda m, j: m.state.qdd[j]), "kg m^2", "drive", positive=True, rank=1),
-    Mistake("coupled_rotor", coupled, "kg m^2", "drive", rank=3),
+    Mistake("coupled_rotor", coupled, "kg m^2", "drive", rank=RARE),
     Mistake("spring", of_joint(lambda m, j: m.state.q[j]), "N m/rad", "drive"),
     Mistake("load", of_joint(lambda m, j: np.abs(m.load[j]) * np.sign(m.state.qd[j])), "1", "friction", positive=True),
     *(Mistake("velocity", of_joint(partial(fading, share=share)), "N m", "friction") for share in CREEP),
@@ -86,11 +88,11 @@ OF_JOINTS: tuple[Mistake, ...] = (
     Mistake("asymmetry", of_joint(lambda m, j: np.abs(m.state.qd[j])), "N m s/rad", "friction"),
     Mistake("warming", of_joint(lambda m, j: (m.t - m.t[0]) * m.state.qd[j]), "N m/rad", "friction"),
     Mistake("warming", of_joint(lambda m, j: (m.t - m.t[0]) * np.sign(m.state.qd[j])), "N m/s", "friction"),
-    *(Mistake("hysteresis", of_joint(turning(share)), "N m", "friction", positive=True, rank=3) for share in PRESLIDING),
-    Mistake("backlash", backlash, "rad", "drive", positive=True, rank=3),
-    Mistake("elasticity", elasticity, "rad/(N m)", "drive", positive=True, rank=3),
-    *(Mistake("length", partial(link_length, axis=axis), "m", "link", axis, most=LONG, rank=3) for axis in range(3)),
-    Mistake("axis", link_axis, "rad", "link", most=0.5, rank=3),
+    *(Mistake("hysteresis", of_joint(turning(share)), "N m", "friction", positive=True, rank=RARE) for share in PRESLIDING),
+    Mistake("backlash", backlash, "rad", "drive", positive=True, rank=RARE),
+    Mistake("elasticity", elasticity, "rad/(N m)", "drive", positive=True, rank=RARE),
+    *(Mistake("length", partial(link_length, axis=axis), "m", "link", axis, most=LONG, rank=RARE) for axis in range(3)),
+    Mistake("axis", link_axis, "rad", "link", most=0.5, rank=RARE),
 )
 """Mistakes of a joint."""
 
@@ -105,12 +107,12 @@ OF_ROBOT: tuple[Mistake, ...] = (
     Mistake("velocity", of_every(lambda m, j: m.state.qd[j] * np.abs(m.state.qd[j]), drag), "1", "friction"),
     Mistake("asymmetry", asymmetric, "1", "friction"),
     *(
-        Mistake("hysteresis", of_every(turning(share), friction), "1", "friction", positive=True, rank=3)
+        Mistake("hysteresis", of_every(turning(share), friction), "1", "friction", positive=True, rank=RARE)
         for share in PRESLIDING
     ),
-    Mistake("saturation", of_every(lambda m, j: -(m.torque[j] ** 3), lambda m, j: 1 / rms(m.torque[j]) ** 2), "1", rank=3),
+    Mistake("saturation", of_every(lambda m, j: -(m.torque[j] ** 3), lambda m, j: 1 / rms(m.torque[j]) ** 2), "1", rank=RARE),
     Mistake("rate", lambda m, _: whole_rows(m.faster()), "1", "clock", most=0.3),
-    Mistake("clock_drift", lambda m, _: whole_rows(-(m.t - m.t[0]) * m.rate(m.torque)), "s/s", "clock", rank=3),
+    Mistake("clock_drift", lambda m, _: whole_rows(-(m.t - m.t[0]) * m.rate(m.torque)), "s/s", "clock", rank=RARE),
 )
 """Mistakes of the whole robot, or of all torques."""
 
@@ -120,10 +122,10 @@ FROM_AN_INSTANT: tuple[Mistake, ...] = (Mistake("payload", payload, "kg", "link"
 COGGING = Mistake("cogging", ripple, "N m", "drive")  # Of `setting` waves a turn, those that residuals have most of
 COMMUTATION = Mistake("commutation", ripple, "1", "drive", most=0.5)  # The same in the torque constant
 
-COLLISION = Mistake("collision", of_joint(lambda m, _: np.ones_like(m.t)), "N m", rank=3)
+COLLISION = Mistake("collision", of_joint(lambda m, _: np.ones_like(m.t)), "N m", rank=RARE)
 """A torque that acts for a moment, where residuals are largest."""
 
 BASE: tuple[Mistake, ...] = tuple(
-    Mistake("base_motion", partial(pushed, axis=axis), "m/s^2", "base", rank=3) for axis in range(3)
+    Mistake("base_motion", partial(pushed, axis=axis), "m/s^2", "base", rank=RARE) for axis in range(3)
 )
 """Motion of the base, at the frequencies that residuals have."""

@@ -9,6 +9,7 @@ from idbench.identify.arrays import TINY, Array
 from idbench.identify.estimators.leave_out import Stretches
 from idbench.identify.estimators.problem import Problem
 from idbench.identify.judge.fitted_motion import FittedMotion
+from idbench.identify.judge.stretches import held_torque
 from idbench.identify.judge.suspect import Suspect
 from idbench.identify.signals.signals import State
 
@@ -19,6 +20,7 @@ PEAK = 0.4
 24 s has 12 stretches; noise that is correlated over 0.2 s puts up to a fifth of its squares in one."""
 
 
+STILL = 1e-9  # Standard deviation, over its largest value, below which a signal is constant but for rounding
 WORTH_A_WORD = 2.0  # Error [% of the torque] from which on something that no mistake explains is named
 FAINT = 0.15  # Share below which functions predict nothing: of 12 bits and coloured noise they predict up to 0.12
 
@@ -54,17 +56,18 @@ def motion_shares(problem: Problem, X: Array) -> list[MotionShare]:
         Its estimate.
     """
     rows, stretches = problem.rows, Stretches.of(problem.parts)
+    measured = rows.by_kind(rows.Y + np.concatenate([held_torque(part) for part in problem.parts]))
     e = rows.by_kind((rows.Y - rows.predicted(X)) * rows.valid)
     place = np.concatenate([stretches.at(k, part.rows.time) for k, part in enumerate(problem.parts)])
     place = place.reshape(-1, rows.kinds)[:, 0]
     variables = [_variables(problem, X, k) for k in range(len(problem.parts))]
-    every = {name: np.concatenate([each[name] for each in variables]) for name in variables[0]}
+    every = {name: _scaled(np.concatenate([each[name] for each in variables])) for name in variables[0]}
     found = list[MotionShare]()
     for j in range(problem.basis.n):
         groups = dict(_functions(every, j, problem.basis.n))
         inside = rows.by_kind(rows.valid.astype(float))[j] > 0
         own, where = e[j][inside], place[inside]
-        rms, level = (float(np.sqrt(np.mean(x**2))) if len(own) else 0.0 for x in (own, rows.by_kind(rows.Y)[j][inside]))
+        rms, level = (float(np.sqrt(np.mean(x**2))) if len(own) else 0.0 for x in (own, measured[j][inside]))
         if not rms:
             found.append(MotionShare(0.0, level, 0.0, ""))
             continue
@@ -80,16 +83,20 @@ def motion_shares(problem: Problem, X: Array) -> list[MotionShare]:
 
 
 def _variables(problem: Problem, X: Array, k: int) -> dict[str, Array]:
-    """Signals of all joints at the rows of a log, each scaled to unit variance, shape (row, joint)."""
+    """Signals of all joints at the rows of a log, shape (row, joint)."""
     part = problem.parts[k]
     state, time = part.signals.state, part.rows.time[:: part.rows.kinds]
     t = np.arange(state.q.shape[-1]) / part.signals.fs
     q, qd, qdd = (np.array([np.interp(time, t, x) for x in y]) for y in (state.q, state.qd, state.qdd))
     conditions = {name: np.array([np.interp(time, t, x) for x in y]) for name, y in state.conditions.items()}
     motion = FittedMotion(problem.basis, X, State(q, qd, lambda _: qdd, conditions), time, part.signals.log.poses)
-    signals = {"position": q, "velocity": qd, "acceleration": qdd, "load": motion.load}
-    centred = {name: x - x.mean(axis=1, keepdims=True) for name, x in signals.items()}
-    return {name: (x / np.maximum(x.std(axis=1, keepdims=True), TINY)).T for name, x in centred.items()}
+    return {"position": q.T, "velocity": qd.T, "acceleration": qdd.T, "load": motion.load.T}
+
+
+def _scaled(x: Array) -> Array:
+    """Signals of zero mean and unit variance; 0 of what does not move."""
+    size = x.std(axis=0)
+    return np.divide(x - x.mean(axis=0), size, out=np.zeros_like(x), where=size > STILL * np.abs(x).max(axis=0))
 
 
 def _functions(every: dict[str, Array], j: int, n: int) -> Iterator[tuple[str, Array]]:
@@ -115,9 +122,10 @@ def _predicted(functions: Array, e: Array, place: Array) -> float:
 
 def something_else(shares: Sequence[MotionShare]) -> Iterator[Suspect]:
     """Yield what no mistake explains though the motion predicts it: at the joint where it is most of the torque."""
-    every = [(100 * each.rms * each.share**0.5 / max(each.level, TINY), j) for j, each in enumerate(shares)]
+    predicted = [(j, each) for j, each in enumerate(shares) if each.share > FAINT]
+    every = [(100 * each.rms * each.share**0.5 / max(each.level, TINY), j) for j, each in predicted]
     most, j = max(every, default=(0.0, 0))
-    if most > WORTH_A_WORD and shares[j].share > FAINT:
+    if most > WORTH_A_WORD:
         one, pair = shares[j], tuple(100 * x / max(shares[j].level, TINY) for x in (shares[j].rms, shares[j].noise))
         cause = one.variable or "moment"
         size = one.rms * one.share**0.5

@@ -7,16 +7,18 @@ import numpy as np
 from idbench.identify.arrays import TINY, Array
 from idbench.identify.estimators.log_rows import LogRows, split_by_log
 
-WAVES = np.arange(2, 91)
-"""Waves a turn that are looked for: harmonic drives have 2, motors of 6 to 90 slots without a gear as many."""
+WAVES = np.arange(1, 91)
+"""Waves a turn that are looked for: a cable has 1, harmonic drives 2, motors of 6 to 90 slots without a gear as many."""
 
-LIKELY = 2  # Numbers of waves whose columns are made, for each joint: those that residuals have most of
-APART = 2  # Waves by which these differ: along a short way neighbours look alike
+LIKELY = 2  # Numbers of waves that residuals have most of, for each joint, whose columns are made
+APART = 2  # Waves about these whose columns are made, too: parameters have taken a part of what residuals had
 SEEN = 0.02  # Share of the motion in which a wave must be within the band of the rows
 
 
-def likely_waves(parts: Sequence[LogRows], e: Array, sizes: Sequence[Array], cutoff: float) -> Iterator[tuple[int, int]]:
-    """Yield joints, each with numbers of waves a turn that residuals have most of.
+def likely_waves(
+    parts: Sequence[LogRows], e: Array, sizes: Sequence[Array], cutoff: float, hinges: Sequence[int]
+) -> Iterator[tuple[int, int]]:
+    """Yield hinges, each with numbers of waves a turn that residuals may have most of.
 
         s_k = |sum_t e(t) x(t) exp(i k q(t))|^2 / sum_t x(t)^2 [k |qd| < 2 pi f_c]
 
@@ -32,15 +34,19 @@ def likely_waves(parts: Sequence[LogRows], e: Array, sizes: Sequence[Array], cut
         Amplitude of the wave over its size in each log, x: 1, or the torque that a ripple is a share of.
     cutoff : float
         Band of the rows, f_c [Hz].
+    hinges : sequence of int
+        The joints that are looked at.
     """
     every = zip(parts, split_by_log(e, parts), sizes, strict=True)
     scores = np.sum([_scores(part, own, x, cutoff) for part, own, x in every], axis=0)
-    for j, score in enumerate(scores):
+    for j in hinges:
+        likely, score = set[int](), scores[j]
         for _ in range(LIKELY):
-            best = int(WAVES[score.argmax()])
+            near = np.abs(WAVES - WAVES[score.argmax()]) <= APART
             if score.max() > TINY:
-                yield j, best
-            score[np.abs(WAVES - best) < APART] = 0.0
+                likely |= set(WAVES[near].tolist())
+            score[near] = 0.0
+        yield from ((j, k) for k in sorted(likely))
 
 
 def _scores(part: LogRows, e: Array, size: Array, cutoff: float) -> Array:

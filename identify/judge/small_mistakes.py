@@ -12,9 +12,9 @@ from idbench.identify.errors import IdentificationError
 from idbench.identify.estimators.log_rows import split_by_log
 from idbench.identify.estimators.problem import Problem
 from idbench.identify.judge.delay_step import torque_lateness
-from idbench.identify.judge.mistake_rows import Candidate, MistakeRows, held_torque
+from idbench.identify.judge.mistake_rows import Candidate, MistakeRows
 from idbench.identify.judge.mistakes import COLLISION, GAIN, RARE
-from idbench.identify.judge.stretches import errors_of_stretches, left_unexplained, noise_errors, scatter_of_sums
+from idbench.identify.judge.stretches import errors_of_stretches, held_torque, left_unexplained, noise_errors, scatter_of_sums
 from idbench.identify.judge.suspect import Suspect
 
 APART = 1e-2

@@ -11,8 +11,20 @@ from idbench.identify.rows.factors import CONVERGED
 MEMORY = 3.0  # Time [s] over which residuals are correlated: 0.2 to 3 s on real robots
 
 
+def held_torque(part: LogRows) -> Array:
+    """The rows of the torque of parameters that are held, and of laws about their shapes: measured ones less Y, shape (r,)."""
+    to_rows = part.rows.maps[0]
+    return np.asarray(to_rows.measurement(to_rows.signals.torque.mean) - part.rows.Y)
+
+
+def torque_squares(problem: Problem) -> Array:
+    """Sum of the squares of each joint's measured torque in the explicit rows, shape (joint,)."""
+    rows, held = problem.rows, np.concatenate([held_torque(part) for part in problem.parts])
+    return np.asarray(np.sum(rows.by_kind((rows.Y + held) * rows.valid) ** 2, axis=-1))
+
+
 def held_out_errors(problem: Problem) -> Array:
-    """Return the rms errors of each joint on stretches of the rows that were not fitted [% of its torque], shape (joint,).
+    """Rms errors of each joint on stretches of the rows that were not fitted [% of its torque], shape (joint,).
 
     By weighted least squares, as fits of single stretches are by then.
     """
@@ -22,23 +34,27 @@ def held_out_errors(problem: Problem) -> Array:
 
 
 def errors_of_stretches(problem: Problem, white: Array, Y: Array, plain: Array) -> Array:
-    """Rms errors on stretches, each predicted by a fit of the others, of rows (white, Y) made independent [% of the torque]."""
+    """Rms errors on stretches, each predicted by a fit of the others, of rows (white, Y) made independent [% of the torque].
+
+    Next to nothing of a joint that has no torque.
+    """
     rows, own = problem.rows, len(plain)
     parts, stretches = problem.parts, Stretches.of(problem.parts)
     joined = np.column_stack([white, Y])
     X = left_out(stretches.products(parts, split_by_log(joined[:own], parts)), joined[own:])
     stretch = np.concatenate([stretches.at(k, part.rows.time) for k, part in enumerate(parts)])
     errors = rows.Y - np.sum(plain * X[stretch], axis=-1)
-    squares, of_all = (np.sum(rows.by_kind(x * rows.valid) ** 2, axis=-1) for x in (errors, rows.Y))
-    return np.asarray(100 * np.sqrt(np.maximum(squares, TINY) / np.maximum(of_all, TINY)))
+    squares, of_all = np.sum(rows.by_kind(errors * rows.valid) ** 2, axis=-1), torque_squares(problem)
+    share = np.divide(squares, of_all, out=np.zeros_like(squares), where=of_all > TINY)
+    return np.asarray(100 * np.sqrt(np.maximum(share, TINY)))
 
 
 def noise_errors(problem: Problem) -> Array:
     """Rms of the noise in the rows of each joint [% of its torque], shape (joint,)."""
     rows, explicit = problem.explicit.rows, problem.explicit
     variance = np.concatenate([part.noisy.variance(explicit.noise) for part in explicit.parts])
-    squares, of_all = (np.sum(rows.by_kind(x * rows.valid), axis=-1) for x in (variance, rows.Y**2))
-    return np.asarray(100 * np.sqrt(np.maximum(squares, 0.0) / np.maximum(of_all, TINY)))
+    squares = np.maximum(np.sum(rows.by_kind(variance * rows.valid), axis=-1), 0.0)
+    return np.asarray(100 * np.sqrt(squares / np.maximum(torque_squares(explicit), TINY)))
 
 
 def left_unexplained(before: Array, after: Array, noise: Array) -> Array:
@@ -56,7 +72,7 @@ def left_unexplained(before: Array, after: Array, noise: Array) -> Array:
 
 
 def scatter_of_sums(part: LogRows, left: Array, rest: Array) -> Array:
-    """Return the covariance of left' rest, rest being as correlated as it is, and not less than white, shape (g, g)."""
+    """Covariance of left' rest, rest being as correlated as it is, and not less than white, shape (g, g)."""
     to_rows = part.rows.maps[0]
     lags = min(max(2, int(MEMORY * to_rows.signals.fs / to_rows.grid.step)), to_rows.grid.count)
     c = np.stack([part.rows.by_kind(x) for x in left.T], axis=-1)

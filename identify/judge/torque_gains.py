@@ -10,8 +10,7 @@ import numpy.typing as npt
 from idbench.identify.arrays import HELD, TINY, Array
 from idbench.identify.data.motion_log import never_logged
 from idbench.identify.estimators.problem import Problem
-from idbench.identify.judge.mistake_rows import held_torque
-from idbench.identify.judge.stretches import variance_of_sums
+from idbench.identify.judge.stretches import held_torque, variance_of_sums
 from idbench.identify.signals.signals import State
 
 ROUNDS, SETTLED = 60, 1e-7  # Gauss-Newton steps at most, and the change of the misfit, for each joint, that ends them
@@ -40,7 +39,7 @@ class TorqueGains:
     factors: Array
     """Triangular factors of [W_j, h_j, tau_j] of each joint, shape (joint, p + 2, p + 2)."""
     counts: npt.NDArray[np.intp]
-    """Rows of each joint, shape (joint,)."""
+    """Rows of each joint that has a torque, shape (joint,)."""
     free: npt.NDArray[np.bool_]
     """Which gains are free, shape (joint,)."""
     start: Array
@@ -57,7 +56,7 @@ class TorqueGains:
             R = np.linalg.qr(whole[rows.group == j], mode="r")
             factors[j, : len(R)] = R
         driven = (factors[:, :, -1] != 0).any(axis=1) & ~np.isin(np.arange(n), never_logged(problem.logs))
-        return cls(problem, factors, np.maximum(rows.count, 1), driven, np.ones(n))
+        return cls(problem, factors, rows.count * driven, driven, np.ones(n))  # nothing has a size where there is no torque
 
     @property
     def n(self) -> int:

@@ -42,6 +42,7 @@ HALF = 0.5  # Share of an error that such a mistake may leave though it is noise
 GRAVITY = 9.81  # [m/s^2]
 DEGREE = np.pi / 180  # [rad]
 TURNS, SETTLED = 8, 1.0  # Steps of its direction at most, and what each must take of the misfit
+LEAST_TURN = 0.02  # [rad] below which it is that of the file: less is a tilt, which has a test of its own
 LARGEST_TURN = 0.7  # [rad] in one of them: half of the way from one axis to the next
 ALMOST_NONE = 1e-3  # Share of gravity in torques that are without it: so little that parameters stay apart
 
@@ -56,6 +57,8 @@ class _Tried:
     """The problem as it would be without the mistake."""
     gains: tuple[tuple[float, ...], ...] = ()
     """What torques are multiplied by, in the ways that explain the same."""
+    like: Problem | None = None
+    """The problem with the mistake, if that is not the given one: with the same parameters."""
 
     @property
     def key(self) -> tuple[str, str, int | None, tuple[float, ...]]:
@@ -82,7 +85,7 @@ def whole_mistakes(problem: Problem, small: Suspect | None = None) -> list[Suspe
     tried = [*_gains(explicit), *_gravities(explicit), *(_rates(explicit) if small else ())]
     if small or _worst(explicit) > POOR:
         tried += [*_likely(explicit), *_tilted(explicit)]
-    gains = [before - each.misfit(counts) for each in tried]
+    gains = [(float(each.like.factors.misfit(counts)) if each.like else before) - each.misfit(counts) for each in tried]
     most = max(gains, default=0.0)
     found = sorted(zip(gains, tried, strict=True), key=lambda one: -one[0] if one[0] < NEARLY_ALL * most else -np.inf)
     before_errors, noise = held_out_errors(explicit), noise_errors(explicit)
@@ -207,7 +210,8 @@ def _across(problem: Problem) -> Iterator[_Tried]:
     axes = np.linalg.svd(tree.gravity[None])[2][1:] if there else np.eye(3)
     free = there and problem.prior is None  # a prior has rows of its own
     basis = with_first_link_moments(problem.basis) if free else problem.basis
-    yield from (_with_gravity(problem, basis, sign * g * a) for a in axes for sign in (1, -1))
+    like = problem.with_basis(basis) if free else None
+    yield from (_with_gravity(problem, basis, sign * g * a, like) for a in axes for sign in (1, -1))
 
 
 def _tilted(problem: Problem) -> Iterator[_Tried]:
@@ -216,17 +220,20 @@ def _tilted(problem: Problem) -> Iterator[_Tried]:
     if tree is None or not np.any(tree.gravity) or problem.logs[0].poses:
         return
     basis = problem.basis if problem.prior else with_first_link_moments(problem.basis)
-    begins = [_with_gravity(problem, basis, tree.gravity), *_across(problem)]
+    like = problem.with_basis(basis)
+    begins = [_with_gravity(problem, basis, tree.gravity, like), *_across(problem)]
     best = min(begins, key=lambda one: one.misfit(counts))
     misfit = best.misfit(counts)
     for _ in range(TURNS):
         if (tilt := _tilt(best.problem)) is None:
             break
-        after = _with_gravity(problem, basis, rotation(tilt) @ np.array(best.size))
+        after = _with_gravity(problem, basis, rotation(tilt) @ np.array(best.size), like)
         if not (less := after.misfit(counts)) < misfit - SETTLED:
             break
         best, misfit = after, less
-    yield best
+    g = float(np.linalg.norm(tree.gravity))
+    if np.linalg.norm(np.array(best.size) - tree.gravity) > LEAST_TURN * g:
+        yield best
 
 
 def _tilt(problem: Problem) -> Array | None:
@@ -245,13 +252,13 @@ def _tilt(problem: Problem) -> Array | None:
     return vector * min(1.0, LARGEST_TURN / max(float(np.linalg.norm(vector)), TINY))
 
 
-def _with_gravity(problem: Problem, basis: Basis, gravity: Array) -> _Tried:
+def _with_gravity(problem: Problem, basis: Basis, gravity: Array, like: Problem | None = None) -> _Tried:
     tree = tree_of(basis)
     assert tree is not None
     elsewhere = problem.with_basis(on_tree(basis, replace(tree, gravity=gravity)))
     if hidden := elsewhere.factors.together.hidden():  # such as first moments about an axis along which gravity now is
         elsewhere = elsewhere.with_basis(elsewhere.basis.without(*hidden))
-    return _Tried("gravity", "base", None, tuple(gravity.tolist()), elsewhere)
+    return _Tried("gravity", "base", None, tuple(gravity.tolist()), elsewhere, like=like)
 
 
 def turned_position(problem: Problem, j: int) -> Problem:
@@ -260,9 +267,12 @@ def turned_position(problem: Problem, j: int) -> Problem:
 
 
 def _in_degrees(problem: Problem) -> Iterator[_Tried]:
-    """Yield positions of hinges that are in degrees: of all, or of one."""
+    """Yield positions of hinges that are in degrees: of all, or of one. Without a torque nothing has a size."""
     n = problem.basis.n
-    hinges = np.array([j not in problem.basis.slides for j in range(n)])
+    driven = problem.factors.R[:, :, -1].any(axis=1)
+    hinges = driven & np.array([j not in problem.basis.slides for j in range(n)])
+    if not driven.all():
+        return
     yield _Tried("unit", "position", None, (DEGREE,), _changed(problem, q=np.diag(np.where(hinges, DEGREE, 1.0))))
     for j in np.flatnonzero(hinges) if n > 1 else ():
         one = np.diag(np.where(np.arange(n) == j, DEGREE, 1.0))

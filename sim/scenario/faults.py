@@ -21,6 +21,18 @@ HELD = 0.1  # Distance of a payload from the frame of the last link [m]
 SHAKEN = 3.0  # Frequency at which a base moves [Hz]
 SLOW = 0.2  # Velocity of the Stribeck effect over the joint's rms speed
 PRESLIDING = 0.03  # Distance in which friction turns, over the standard deviation of the joint's positions
+RANGES = {
+    "saturation": (0.0, 1.0),
+    "falling-constant": (0.0, 1.0),
+    "rate": (-0.9, 9.0),
+    "clock-drift": (-0.1, 0.1),
+    "dropouts": (0.0, 1.0),
+}
+"""Sizes of some faults, between which they make sense."""
+
+OF_PAIRS = frozenset({"coupled-rotor", "exchanged-torques", "exchanged-positions", "exchanged"})
+"""Faults of a joint and the next."""
+
 STEEP = 10.0  # Of teeth that change sides: over the standard deviation of what they carry
 
 
@@ -44,6 +56,16 @@ class Fault:
     def __post_init__(self) -> None:
         if self.kind not in FAULTS:
             raise ScenarioError(f"kind = {self.kind!r} is unknown{did_you_mean(self.kind, FAULTS)}; known: {', '.join(FAULTS)}")
+        flaw, low, high = FAULTS[self.kind], *RANGES.get(self.kind, (-np.inf, np.inf))
+        if flaw.unit and not (self.size and low < self.size < high):
+            between = f", between {low:g} and {high:g}" if self.kind in RANGES else ""
+            raise ScenarioError(
+                f"size = {self.size:g} [{flaw.unit}] of a fault {self.kind!r} must be a number other than 0{between}"
+            )
+        if self.end is not None and self.end <= self.start:
+            raise ScenarioError(f"end = {self.end:g} s must be after start = {self.start:g} s")
+        if self.kind in OF_PAIRS and not self.joint:
+            raise ScenarioError(f"joint is missing: a fault {self.kind!r} is of a joint and the next")
 
 
 @dataclass(eq=False)
@@ -201,7 +223,7 @@ def _coupled(x: _Joint) -> None:
 
 def _presliding(x: _Joint) -> Array:
     """Dahl's friction less Coulomb's: size (z - sign(qd)), dz/dq = (sign(qd) - z) / distance."""
-    distance, z, found = PRESLIDING * np.std(x.angle), 0.0, np.zeros(len(x.angle))
+    distance, z, found = PRESLIDING * np.std(x.angle) or 1.0, 0.0, np.zeros(len(x.angle))
     for k, step in enumerate(np.diff(x.angle, prepend=x.angle[0])):
         z = np.sign(step) + (z - np.sign(step)) * np.exp(-np.abs(step) / distance)
         found[k] = z
@@ -211,7 +233,7 @@ def _presliding(x: _Joint) -> Array:
 def _dropped(x: _Joint) -> None:
     """Samples that repeat the one before: a share `size` of all, six at a time."""
     r = x.record
-    for k in r.rng.choice(len(r.t) - 7, max(1, round(x.size * len(r.t) / 6)), replace=False):
+    for k in r.rng.integers(0, len(r.t), max(1, round(x.size * len(r.t) / 6))):
         r.q[k + 1 : k + 7], r.tau[k + 1 : k + 7] = r.q[k], r.tau[k]
 
 
@@ -251,8 +273,8 @@ def _longer(x: _Joint, model: Any) -> None:
 
 def _bent(x: _Joint, model: Any) -> None:
     axis = np.array(model.jnt_axis[x.j])
-    other = np.eye(3)[np.argmin(np.abs(axis))]
-    model.jnt_axis[x.j] = np.cos(x.size) * axis + np.sin(x.size) * np.cross(other, axis)
+    across = np.cross(np.eye(3)[np.argmin(np.abs(axis))], axis)
+    model.jnt_axis[x.j] = np.cos(x.size) * axis + np.sin(x.size) * across / np.linalg.norm(across)
 
 
 FAULTS: Mapping[str, Flaw] = {
@@ -268,7 +290,7 @@ FAULTS: Mapping[str, Flaw] = {
     ),
     "falling-constant": Flaw(
         "currents say more than the torque constant still gives, by a share at the largest", "1", ("saturation", "torque"),
-        _torque_is(lambda x: x.tau / (1 - x.size * (x.tau / _largest(x)) ** 2)),
+        _torque_is(lambda x: x.tau / (1 - x.size * (x.tau / (_largest(x) or 1.0)) ** 2)),
     ),
     "dead-band": Flaw(
         "small torques are not logged", "N m", ("dead_band", "torque"), _torque(lambda x: -np.clip(x.tau, -x.size, x.size))
@@ -296,7 +318,7 @@ FAULTS: Mapping[str, Flaw] = {
     ),
     "stribeck": Flaw(
         "more friction near rest", "N m", ("velocity", "friction"),
-        _torque(lambda x: x.size * np.exp(-((x.qd / (SLOW * x.qd.std())) ** 2)) * np.sign(x.qd)),
+        _torque(lambda x: x.size * np.exp(-((x.qd / (SLOW * x.qd.std() or 1.0)) ** 2)) * np.sign(x.qd)),
     ),
     "asymmetry": Flaw(
         "friction that differs by direction", "N m s/rad", ("asymmetry", "friction"), _torque(lambda x: x.size * np.abs(x.qd))
@@ -313,7 +335,7 @@ FAULTS: Mapping[str, Flaw] = {
     ),
     "backlash": Flaw(
         "play, with the encoder at the motor", "rad", ("backlash", "drive"),
-        _position_is(lambda x: x.q + x.size / 2 * np.tanh(STEEP * x.load / x.load.std())),
+        _position_is(lambda x: x.q + x.size / 2 * np.tanh(STEEP * x.load / (x.load.std() or 1.0))),
     ),
     "elasticity": Flaw(
         "an elastic gear, with the encoder at the motor", "rad/(N m)", ("elasticity", "drive"),
@@ -352,6 +374,8 @@ def require_joints(robot: Robot, faults: Sequence[Fault]) -> None:
         if fault.joint and (whole or fault.joint not in joints):
             known = "it is of the whole robot: leave joint out" if whole else f"joints are {', '.join(joints)}"
             raise ScenarioError(f"fault {fault.kind!r}: joint = {fault.joint!r}; {known}")
+        if fault.kind in OF_PAIRS and fault.joint == joints[-1]:
+            raise ScenarioError(f"fault {fault.kind!r}: there is no joint after {fault.joint!r}")
 
 
 def with_faults(

@@ -123,13 +123,28 @@ def test_scenarios_with_faults_are_written_and_read(tmp_path):
     ("fault", "message"),
     [
         ({"kind": "gian"}, r"kind = 'gian' is unknown \(did you mean 'gain'\?\)"),
-        ({"kind": "gain", "joint": "elbow"}, "joint = 'elbow'; joints are joint1, joint2"),
-        ({"kind": "payload", "joint": "joint1"}, "leave joint out"),
+        ({"kind": "gain", "joint": "elbow", "size": 0.1}, "joint = 'elbow'; joints are joint1, joint2"),
+        ({"kind": "payload", "joint": "joint1", "size": 1.0}, "leave joint out"),
+        ({"kind": "gain"}, r"size = 0 \[1\] of a fault 'gain' must be a number other than 0"),
+        ({"kind": "rate", "size": -1.0}, "between -0.9 and 9"),
+        ({"kind": "push", "size": 1.0, "start": 2.0, "end": 1.0}, "end = 1 s must be after start = 2 s"),
+        ({"kind": "exchanged"}, "joint is missing"),
+        ({"kind": "exchanged", "joint": "joint2"}, "there is no joint after 'joint2'"),
     ],
 )
 def test_faults_that_make_no_sense_are_refused(fault, message):
     with pytest.raises(ScenarioError, match=message):
         simulate(replace(from_dict({"name": "one", "trajectory": "brisk", "fault": [fault]})))
+
+
+def test_joints_at_rest_and_without_a_torque_take_every_fault():
+    still = np.zeros((400, ROBOT.n))
+    log = MotionLog(100.0, still, still, TorqueChannel("instantaneous"))
+    for kind, flaw in FAULTS.items():
+        fault = Fault(kind, 0.05, "" if flaw.whole else "joint3")
+        found = with_faults(ROBOT, log, (still, still, still), (fault,), np.random.default_rng(0))
+        assert np.isfinite(found.q).all()
+        assert np.isfinite(found.tau).all()
 
 
 SIZES = {
@@ -145,7 +160,8 @@ FAST = ("gain", "cogging", "delay", "degrees")
 
 @pytest.mark.parametrize("kind", [pytest.param(kind, marks=() if kind in FAST else pytest.mark.thorough) for kind in SIZES])
 def test_the_doctor_names_a_fault_and_its_joint(kind):
-    scenario = replace(load("ideal"), fault=(Fault(kind, SIZES[kind], "joint2"),))
+    joint = "joint1" if "exchanged" in kind else "joint2"
+    scenario = replace(load("ideal"), fault=(Fault(kind, SIZES[kind], joint),))
     fit = idbench.fit(simulate(scenario).alone(), "scara", armature="all").fit
     first = fit.diagnosis[0]
     assert (first.suspect.cause, first.suspect.of) == FAULTS[kind].cause
