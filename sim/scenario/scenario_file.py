@@ -79,6 +79,8 @@ def _content(name: str) -> dict[str, Any]:
 def from_dict(content: Mapping[str, Any]) -> Scenario:
     """Make a scenario from the keys of a TOML document; raise ScenarioError as `load`."""
     made = dict(content)
+    if isinstance(made.get("fault"), dict):
+        raise ScenarioError("[fault] needs two brackets, [[fault]]: there may be several")
     if "trajectory" not in made and (old := [key for key in OF_0_1_0 if key in made]):
         raise ScenarioError(
             f'this is a scenario of idbench 0.1.0: write {", ".join(old)} below a line [trajectory], with kind = "quintic"'
@@ -162,6 +164,10 @@ def to_toml(scenario: Scenario) -> str:
             tables += ["\n".join(_table(key, fault, several=True)) for fault in value]
         elif value not in ("", (), None):
             simple.append(_explained(type(scenario), key, value))
+    if not scenario.fault:
+        tables.append(
+            "# [[fault]]  # something wrong with robot or log: `idbench list` has the kinds\n# kind = ...\n# size = ..."
+        )
     tables.sort(key=lambda table: len(table) > LONGEST)  # waypoints come last: the rest is what one changes
     return "\n\n".join(["\n".join(simple), *tables]) + "\n"
 
