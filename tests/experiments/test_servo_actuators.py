@@ -63,6 +63,9 @@ def test_the_file_of_a_simulation_is_found_from_commands_and_positions(leg):
         of = found["joints"][joint]
         assert of["kp"]["value"] == pytest.approx(kp, rel=0.01)
         for name, true in TRUE.items():
+            if of[name]["value"] is None:  # the calf is so light that its load sets no scale of torques, nor of an offset
+                assert (joint, name) == ("knee", "offset")
+                continue
             # a hundredth of typical sizes beside: sigma of positions that are exact is next to nothing
             assert abs(of[name]["value"] - true) < 3 * of[name]["sigma"] + {"delay": 1e-4}.get(name, 0.01 * max(true, 0.1)), (
                 joint,
