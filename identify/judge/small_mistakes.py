@@ -260,6 +260,8 @@ class _Search:
             explained = float(np.sum((other.left.T @ signal) ** 2))
             if key != candidate.key and key not in others and explained > ALIKE * float(signal @ signal):
                 others.append(key)
+        if self._ways(best):
+            others.append((GAIN.cause, 1 - (candidate.joint or 0)))
         return Suspect(
             candidate.mistake.cause,
             candidate.mistake.of,
@@ -274,8 +276,17 @@ class _Search:
             best.gain,
             candidate.mistake.setting,
             *self.rows.place(candidate.instant),
+            gains=self._ways(best),
             explained=candidate.plain @ best.size - self._plain @ self._absorbed(candidate.white @ best.size),
         )
+
+    def _ways(self, best: _Tested) -> tuple[tuple[float, ...], ...]:
+        """Both ways in which the ratio of two torques becomes right, where nothing sets their size; none of other mistakes."""
+        candidate, n = best.candidate, self.problem.basis.n
+        if candidate.mistake is not GAIN or n != 2 or any(np.any(held_torque(part)) for part in self.problem.parts):
+            return ()
+        factor, own = 1 + self._size_of(best)[0], np.arange(n) == candidate.joint
+        return tuple(np.where(own, 1 / factor, 1.0).tolist()), tuple(np.where(own, 1.0, factor).tolist())
 
     def _size_of(self, best: _Tested) -> tuple[float, ...]:
         """Return the size of a mistake, iterated where that is large beside what its column is linear in."""

@@ -1,12 +1,18 @@
 """What is wrong, as a user sees it: the first and the last line, what mends it, and what a summary says."""
 
 import csv
+import re
+from dataclasses import replace
 
 import pytest
 
+import idbench
 from idbench.experiments.identification.causes import WORDINGS
 from idbench.experiments.identification.friction_laws import FrictionLaws
 from idbench.identify.judge.mistakes import BASE, COGGING, COLLISION, COMMUTATION, FROM_AN_INSTANT, OF_JOINTS, OF_ROBOT
+from idbench.sim.engine.simulation import simulate
+from idbench.sim.scenario.faults import Fault
+from idbench.sim.scenario.scenario_file import load
 
 
 def scaled(source, target, column, factor):
@@ -62,3 +68,21 @@ def test_every_mistake_has_words():
 @pytest.mark.parametrize("law", [wording.law for wording in WORDINGS.values() if wording.law])
 def test_laws_that_are_advised_exist(law):
     assert FrictionLaws.of([f"standard+{law.format(setting=3.0)}"], ["a", "b"]).names[1]
+
+
+@pytest.mark.parametrize(("held", "wrong"), [("Fs1=0.5", False), ("Fs1=0.8", True)])
+def test_what_is_held_is_asked_of_the_log(held, wrong):
+    """Also beside an offset that was not asked for: what is held rightly is no cause."""
+    run = simulate(replace(load("ideal"), fault=() if wrong else (Fault("offset", 0.5, "joint2"),)))
+    causes = idbench.fit(run.alone(), "scara", hold=(held,)).fit.diagnosis
+    if wrong:  # it sets the scale of all torques, whose gains explain the same
+        assert {cause.suspect.cause for cause in causes} == {"gain"}
+        assert f"or --hold {held} contradicts the log" in causes[0].words
+    else:
+        assert [cause.suspect.cause for cause in causes] == ["offset"]
+
+
+def test_options_of_several_mistakes_are_printed_together():
+    faults = Fault("gain", 0.15, "joint1"), Fault("delay", 0.01)
+    fit = idbench.fit(simulate(replace(load("ideal"), fault=faults)).alone(), "scara")
+    assert re.fullmatch(r"--torque-delay estimate --gain 0\.8\d+ 1 or --gain 1 1\.1\d+", fit.answer.step)
