@@ -22,7 +22,7 @@ from idbench.experiments.study.axis import Axis
 from idbench.experiments.study.ratios import study_answer
 from idbench.experiments.study.statistics import MIN_ERROR, Cell
 from idbench.experiments.study.study import Study
-from idbench.experiments.study.study_results import command, worst_runs
+from idbench.experiments.study.worst_runs import command, worst_runs
 from idbench.experiments.text import FORMS, GREY, JOINTS, Color, lighter
 from idbench.identify import Array
 

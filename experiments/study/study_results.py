@@ -3,7 +3,6 @@
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from shlex import quote
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,7 +11,6 @@ from rich.console import Console
 from rich.text import Text
 
 from idbench.experiments.errors import ResultsError
-from idbench.experiments.program import program
 from idbench.experiments.reports.figures import rendered
 from idbench.experiments.results.attempts import Attempts
 from idbench.experiments.results.folder import ResultsFolder
@@ -35,6 +33,7 @@ from idbench.experiments.study.ratios import compares_models, interval, pair_of,
 from idbench.experiments.study.statistics import BOUNDS, Cell, cells
 from idbench.experiments.study.store import Store, arrays
 from idbench.experiments.study.study import Study
+from idbench.experiments.study.worst_runs import command, worst_runs
 from idbench.experiments.text import new_table, print_table
 from idbench.experiments.text import percent as signed
 
@@ -126,38 +125,6 @@ def _differences(cells: Sequence[Cell]) -> Iterator[list[str]]:
     for title, group in grouped(cells).items():
         for d in differences(group):
             yield [title, method(d.better, cells), method(d.worse, cells), f"{d.ratio:.3g}", f"{d.p:.1g}", f"{d.runs}"]
-
-
-WORST = 10  # Runs that are listed
-
-
-def worst_runs(cells: Sequence[Cell]) -> list[tuple[Cell, str, float, int]]:
-    """Return the identifications with the largest relative errors: cell, parameter, error, run.
-
-    The worst run of each combination and model comes first, so that not all are of one kind; each run is there once.
-    """
-    firsts, others = list[tuple[Cell, str, float, int]](), list[tuple[Cell, str, float, int]]()
-    for cell in cells:
-        p = np.nan_to_num(np.abs(cell.error)).argmax(axis=1)
-        own = [(cell, cell.parameters[j], float(cell.error[i, j]), int(cell.run[i])) for i, j in enumerate(p)]
-        own.sort(key=_by_size)
-        firsts += own[:1]
-        others += own[1:]
-    worst: dict[int, tuple[Cell, str, float, int]] = {}
-    for entry in [*sorted(firsts, key=_by_size), *sorted(others, key=_by_size)]:
-        worst.setdefault(entry[3], entry)
-    return list(worst.values())[:WORST]
-
-
-def _by_size(entry: tuple[Cell, str, float, int]) -> float:
-    return -abs(entry[2])
-
-
-def command(study: Study, folder: Path, cell: Cell, run: int) -> str:
-    """Command that makes a run again, identified as in a cell."""
-    number = next(i for i, found in enumerate(study.methods) if found.fits(*cell.names[:2], cell.settings))
-    chosen = f" --method {number}" if number else ""
-    return f"{program()} run --from {quote(str(folder))} --index {run}{chosen}"
 
 
 MOST_REASONS = 3  # Reasons of failures that are printed; the report has all
