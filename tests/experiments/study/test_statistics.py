@@ -10,7 +10,7 @@ from scipy import stats
 from idbench.experiments.study.answer import answer, requirements
 from idbench.experiments.study.comparison import SURE, differences
 from idbench.experiments.study.statistics import Cell, cells
-from idbench.experiments.study.study_results import WORST, worst_runs
+from idbench.experiments.study.worst_runs import WORST, worst_runs
 
 TRUTH = np.array([2.0, -0.5])
 
