@@ -1,136 +1,24 @@
 """What is wrong with a fit, in words, and the option or the line of a file that mends it."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from idbench.experiments.identification.friction_laws import said
 from idbench.experiments.identification.robot_model import RobotModel
+from idbench.experiments.identification.wordings import WORDINGS, Wording
 from idbench.experiments.text import error_percentage
 from idbench.identify import Array, MotionLog
 from idbench.identify.judge.suspect import Suspect
 from idbench.identify.tables import concise
 
 
-class Wording(NamedTuple):
-    """How a cause is called, and mended."""
-
-    what: str
-    """What is wrong, {size} being how much."""
-    mend: str = ""
-    """The option that mends it; empty if none does."""
-    by: str = ""
-    """What else mends it."""
-    law: str = ""
-    """The law of friction that explains it."""
-
-
-WORDINGS: Mapping[tuple[str, str], Wording] = {
-    ("gain", "torque"): Wording("{of_gain}", "{gains}"),
-    ("sign", "torque"): Wording("the torque has the other sign", "{gains}"),
-    ("unit", "position"): Wording("positions are in degrees", "--units q=deg"),
-    ("unit", "joint"): Wording("its position is in degrees", by="convert its column to the unit of the others"),
-    **{
-        ("unknown", of): Wording(f"something else, {{size}} rms, {how}", by=by, law=law)
-        for of, how, by, law in (
-            ("velocity", "over its velocity", "compare laws of friction: --friction auto", ""),
-            (
-                "position",
-                "over its position",
-                "look at its residual over the position: a spring, a cable, a wave of its gear",
-                "",
-            ),
-            ("acceleration", "over its acceleration", "look at its residual over the acceleration: a rotor, a delay", ""),
-            ("load", "over its load", "compare laws of friction: --friction auto", ""),
-            (
-                "other joints",
-                "over the motion of other joints",
-                "are torques mixed, as by a belt or a differential?",
-                "",
-            ),
-            ("moment", "for a moment of the log", "look at its residual over time, and cut that out", ""),
-        )
-    },
-    ("stated", "request"): Wording("{stated} contradicts the log", by="leave {stated} out, or correct it"),
-    ("sign", "joint"): Wording(
-        "position and torque have the other sign: its axis points the other way",
-        by="turn the axis in the robot's file, or both signs in the log",
-    ),
-    ("sign", "position"): Wording(
-        "the position has the other sign", by="turn the axis in the robot's file, or the sign in the log"
-    ),
-    ("offset", "torque"): Wording("torque offset of {size}", "--add offset"),
-    ("drift", "torque"): Wording("the torque drifts by {size}", by="warm the sensor up, or take a shorter log"),
-    ("saturation", "torque"): Wording(
-        "torque constant that falls with the torque, or a limit", by="move more slowly, or with lighter loads"
-    ),
-    ("dead_band", "torque"): Wording("dead band of the torque, {size}", by="calibrate it"),
-    ("delay", "torque"): Wording("torque acts {late} than the log says, by {size}, or lags", "--torque-delay {delay}"),
-    ("delay", "position"): Wording("position is logged {size} {behind}, or lags", by="correct the delay of its position"),
-    ("zero", "position"): Wording(
-        "zero of the position off by {size}", by="subtract it from the joint's positions, or turn the link's frame in the file"
-    ),
-    ("scale", "position"): Wording("positions {size} too {large}", by="correct the scale of the encoder, or its unit"),
-    ("slip", "position"): Wording("position slips by {size} at {instant}", by="take the log up to there, or mend the encoder"),
-    ("eccentric", "position"): Wording(
-        "eccentric encoder, {size}", by="mount the encoder anew, or correct its errors by a table"
-    ),
-    ("rotor", "drive"): Wording("rotor inertia of {size} is missing", "--armature all"),
-    ("coupled_rotor", "drive"): Wording("its rotor also turns with the next joint, {size}", "--coupling {coupling}"),
-    ("spring", "drive"): Wording(
-        "a spring of {size}", by="state stiffness and springref of the joint in the robot's file, or --balancer"
-    ),
-    ("load", "friction"): Wording("friction grows with the load, by {size}", "--friction {laws}", law="load"),
-    ("velocity", "friction"): Wording("friction is nonlinear in velocity", "--friction {laws}", law="stribeck"),
-    ("asymmetry", "friction"): Wording("friction differs by direction", "--friction {laws}", law="asymmetric-viscous"),
-    ("warming", "friction"): Wording(
-        "friction changes with time, as of a robot that warms up", by="log a warm robot, or its temperature"
-    ),
-    ("hysteresis", "friction"): Wording(
-        "friction with hysteresis after reversals (pre-sliding)", by="take a larger --mask-speed, or longer strokes"
-    ),
-    ("cogging", "drive"): Wording(
-        "cogging of {setting:g} waves a turn, {size}", "--friction {laws}", law="cogging:{setting:g}"
-    ),
-    ("commutation", "drive"): Wording(
-        "torque constant with a ripple of {setting:g} waves a turn, {size}", by="correct currents by a table over the position"
-    ),
-    ("backlash", "drive"): Wording("play of {size}", by="measure positions at the link"),
-    ("elasticity", "drive"): Wording("compliance of {size}", by="measure positions at the link, or move more slowly"),
-    ("length", "link"): Wording("origin of the joint off by {size} along {axis}", by="correct its origin in the robot's file"),
-    ("axis", "link"): Wording("axis turned by {size}", by="correct its axis in the robot's file"),
-    ("payload", "link"): Wording("a payload from {instant} on", by="take the log up to there, or idbench payload"),
-    ("collision", "torque"): Wording("a push of {size} at {instant}", by="cut it out of the log"),
-    ("tilt", "base"): Wording("the base is tilted by {size}", "--gravity {gravity}"),
-    ("gravity", "base"): Wording("gravity points elsewhere, or is not in the torques", "--gravity {gravity}"),
-    ("base_motion", "base"): Wording("the base moves, {size}", by="take a stiffer stand, or move more slowly"),
-    ("rate", "clock"): Wording("the motion is {size} {faster} than t says", by="correct the unit of t, or fs"),
-    ("clock_drift", "clock"): Wording(
-        "clocks of positions and torques drift apart by {size}", by="log with one clock, or take a shorter log"
-    ),
-    ("exchanged", "torque"): Wording(
-        "its torque is exchanged with that of {other}", by="exchange the columns of its torque and that of {other}"
-    ),
-    ("exchanged", "position"): Wording(
-        "its position is exchanged with that of {other}", by="exchange the columns of its position and that of {other}"
-    ),
-    ("exchanged", "joint"): Wording(
-        "its columns are exchanged with those of {other}",
-        by="exchange their names in the header; where columns are numbered, --joints {joints}",
-    ),
-    ("missing_torque", "torque"): Wording(
-        "its torque does not follow the motion: it was not logged, and its rows are left out", by="log it"
-    ),
-}
-"""Every cause of the table of mistakes, and what it is a mistake of."""
-
-
 def causes_of(
     suspects: Sequence[Suspect], robot_model: RobotModel, log: MotionLog, gains: Sequence[float] = (), stated: str = ""
 ) -> tuple["Cause", ...]:
-    """Return mistakes as causes of a robot and its first log."""
+    """Mistakes as causes of a robot and its first log."""
     return tuple(Cause(each, robot_model, log, gains, tuple(suspects), stated) for each in suspects)
 
 
@@ -330,7 +218,7 @@ class Cause:
         }
 
     def _gravity(self) -> Array:
-        """Return gravity as it would be without the mistake [m/s^2]."""
+        """Gravity as it would be without the mistake [m/s^2]."""
         g = self.robot_model.tree.gravity
         if self.suspect.cause == "gravity":
             return np.round(self.suspect.size, 2) + 0.0

@@ -11,6 +11,7 @@ from idbench.identify.basis.block import Kind
 from idbench.identify.data.motion_log import MotionLog, never_logged
 from idbench.identify.estimators.problem import Problem
 from idbench.identify.judge.small_mistakes import small_mistakes
+from idbench.identify.judge.stretches import variance_of_sums
 from idbench.identify.judge.suspect import Suspect
 from idbench.identify.judge.torque_gains import DECISIVE, mean_inertias
 from idbench.identify.judge.whole_mistakes import turned_position, whole_mistakes
@@ -68,12 +69,16 @@ def _impossible_signs(problem: Problem, X: Array) -> Iterator[Suspect]:
         return
     factor = problem.factors.fit(2).factor
     C = factor.inverse(np.array(factor.determined))
-    sigma, inertias = np.sqrt(np.diagonal(C)), mean_inertias(problem, X, C)
+    # Standard deviations of residuals as correlated as they are: what is wrong elsewhere is no white noise.
+    rows, to_rows = problem.rows, problem.rows.maps[0]
+    left = rows.by_kind((rows.Y - rows.predicted(X)) * rows.valid)
+    wider = np.sqrt(variance_of_sums(left, to_rows.grid.step / to_rows.signals.fs))
+    sigma, inertias = np.sqrt(np.diagonal(C)), mean_inertias(problem, X, C) / wider
     absent = never_logged(problem.logs)
     of_kind = {(p.kind, p.joint): k for k, p in enumerate(problem.basis.parameters)}
     for j in range(problem.basis.n):
         places = [of_kind.get((kind, j)) for kind in DRIVING]
-        t = [0.0 if k is None else float(X[k] / max(sigma[k], TINY)) for k in places]
+        t = [0.0 if k is None else float(X[k] / max(wider[j] * sigma[k], TINY)) for k in places]
         # A wrong delay takes its share of friction from an inertia, but leaves the friction positive.
         friction, worst = max(t), min(max(t), float(inertias[j]))
         if j not in absent and worst < -KNOWN and friction < KNOWN:

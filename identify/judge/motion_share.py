@@ -33,7 +33,7 @@ class MotionShare(NamedTuple):
     level: float
     """Rms of the torque [N m, N]."""
     share: float
-    """Share of its squares on stretches that were not fitted; 1 where it is there for a moment only, as no noise is."""
+    """Share of its squares on stretches that were not fitted; 1 where it is there for a moment only."""
     variable: str
     """The one variable that predicts most; empty where nothing moves or something happened."""
 

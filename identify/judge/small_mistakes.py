@@ -14,8 +14,9 @@ from idbench.identify.estimators.problem import Problem
 from idbench.identify.judge.delay_step import torque_lateness
 from idbench.identify.judge.mistake_rows import Candidate, MistakeRows
 from idbench.identify.judge.mistakes import COLLISION, GAIN, RARE
-from idbench.identify.judge.stretches import errors_of_stretches, held_torque, left_unexplained, noise_errors, scatter_of_sums
+from idbench.identify.judge.stretches import errors_of_stretches, left_unexplained, noise_errors, scatter_of_sums
 from idbench.identify.judge.suspect import Suspect
+from idbench.identify.judge.torque_gains import TorqueGains
 
 APART = 1e-2
 """Share of the squares of several columns that parameters must leave, and for one to be distinct from the others. With 1e-4,
@@ -38,7 +39,6 @@ NEARLY_ALL = 0.95  # Share of what the most likely one takes from which on a mor
 MOST = 3  # Mistakes that are looked for, one beside the other
 MEDIAN = 0.4549  # Of chi squared with one degree of freedom
 FEWEST, MANY = 2, 100_000  # Rows a parameter, and rows at most: hundreds of columns of as many take a GB
-ROUNDS = 5  # Of the gain of a torque, which is not small where a constant is wrong by tenths
 SOME = 6  # One of so many tests is made whatever it says, to see how they scatter
 
 
@@ -167,6 +167,10 @@ class _Search:
         return before > MATTERS and bool(np.abs(one.size).max() > PUSHED * level)
 
     @cached_property
+    def _gains(self) -> TorqueGains:
+        return TorqueGains.of(self.problem)
+
+    @cached_property
     def _known(self) -> int:
         """Rows of what is known before."""
         prior = self.problem.start.factor.prior
@@ -227,25 +231,6 @@ class _Search:
         least = float(np.min(np.sum(rows.by_kind(e * rows.valid) ** 2, axis=-1) / np.maximum(rows.count, 1)))
         return self._by_chance(len(b), float(b @ b) / max(least, TINY)) < CERTAIN
 
-    def _torque_gain(self, j: int) -> float:
-        """Gain error of a joint's torque: 1 + g(k+1) = (1 + g(k)) (1 + b), b that of Y_j / (1 + g(k))."""
-        rows, gain = self.problem.rows, 1.0
-        held = np.concatenate([held_torque(part) for part in self.problem.parts])
-        Q, R = np.linalg.qr(self._W)
-        for _ in range(ROUNDS):
-            Y = self._white(np.where(rows.group == j, (rows.Y + held) / gain - held, rows.Y))
-            Y[len(Y) - self._known :] = self._Y[len(Y) - self._known :]
-            X = np.linalg.lstsq(R, Q.T @ Y)[0]
-            c = self._white(np.where(rows.group == j, rows.predicted(X) + held, 0.0))
-            left = c - Q @ (Q.T @ c)
-            gain *= 1 + float(left @ Y) / float(left @ left)
-        return gain - 1
-
-    def _white(self, x: Array) -> Array:
-        """Whitened rows, with zeros for the prior."""
-        each = zip(self.problem.parts, split_by_log(x, self.problem.parts), strict=True)
-        return np.concatenate([*(part.whitening.whiten(y[:, None])[:, 0] for part, y in each), np.zeros(self._known)])
-
     def _unlikely(self, e: Array) -> float:
         """Return minus twice the logarithm of the likelihood, with a level of each kind."""
         rows = self.problem.rows
@@ -283,7 +268,7 @@ class _Search:
     def _ways(self, best: _Tested) -> tuple[tuple[float, ...], ...]:
         """Both ways in which the ratio of two torques becomes right, where nothing sets their size; none of other mistakes."""
         candidate, n = best.candidate, self.problem.basis.n
-        if candidate.mistake is not GAIN or n != 2 or any(np.any(held_torque(part)) for part in self.problem.parts):
+        if candidate.mistake is not GAIN or n != 2 or self._gains.scaled:
             return ()
         factor, own = 1 + self._size_of(best)[0], np.arange(n) == candidate.joint
         return tuple(np.where(own, 1 / factor, 1.0).tolist()), tuple(np.where(own, 1.0, factor).tolist())
@@ -292,7 +277,7 @@ class _Search:
         """Return the size of a mistake, iterated where that is large beside what its column is linear in."""
         mistake, joint = best.candidate.mistake, best.candidate.joint
         if mistake is GAIN:
-            return (self._torque_gain(joint or 0),)
+            return (self._gains.of_one(joint or 0) - 1,)
         if (mistake.cause, mistake.of) == ("delay", "torque") and joint is not None:
             return (torque_lateness(self.problem, joint, float(best.size[0])),)
         return tuple(best.size.tolist())

@@ -102,6 +102,10 @@ class TorqueGains:
             found = [_alike(factors, sigma) for factors in found]
         return [factors for factors in found if (factors != 1).any()]
 
+    def of_one(self, j: int) -> float:
+        """By what the torque of one joint is too large if those of all others are right."""
+        return float(replace(self, free=np.arange(self.n) == j).fitted[1][j])
+
     def _without(self, right: npt.NDArray[np.bool_], signs: Array) -> Array:
         """By what each torque is too large if that of some is right, but for its sign; those are, too, that explain little."""
         made = replace(self, free=self.free & ~right, start=signs)

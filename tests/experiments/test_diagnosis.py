@@ -7,8 +7,8 @@ from dataclasses import replace
 import pytest
 
 import idbench
-from idbench.experiments.identification.causes import WORDINGS
 from idbench.experiments.identification.friction_laws import FrictionLaws
+from idbench.experiments.identification.wordings import WORDINGS
 from idbench.identify.judge.mistakes import BASE, COGGING, COLLISION, COMMUTATION, FROM_AN_INSTANT, OF_JOINTS, OF_ROBOT
 from idbench.sim.engine.simulation import simulate
 from idbench.sim.scenario.faults import Fault

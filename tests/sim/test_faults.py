@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import idbench
-from idbench.experiments.identification.causes import WORDINGS
+from idbench.experiments.identification.wordings import WORDINGS
 from idbench.identify import MotionLog, TorqueChannel
 from idbench.sim.engine.simulation import simulate
 from idbench.sim.errors import ScenarioError

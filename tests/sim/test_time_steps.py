@@ -8,6 +8,7 @@ from idbench.sim.robot.inverse_dynamics import coulomb_torque, inverse_dynamics
 from idbench.sim.robot.time_steps import acting_late, actuator_damping, apparent_rotor_inertia, torque_of_steps
 
 H = 0.002
+INNER = slice(500, -20)  # Without the ends, where differences are none
 
 ARM = """<mujoco><option timestep="0.002" integrator="{}"><flag {}/></option>
 <default><joint damping="0.7" armature="0.02" frictionloss="0"/></default><worldbody>
@@ -33,6 +34,14 @@ def slope(x):
     return (np.roll(x, 2, axis=0) - 8 * np.roll(x, 1, axis=0) + 8 * np.roll(x, -1, axis=0) - np.roll(x, -2, axis=0)) / (12 * H)
 
 
+def of_positions(robot, q):
+    """Return positions with their first four derivatives, and the torques that they take by MuJoCo."""
+    motion = [q]
+    for _ in range(4):
+        motion.append(slope(motion[-1]))
+    return motion, inverse_dynamics(robot, *motion[:3]) + coulomb_torque(robot, motion[1])
+
+
 @pytest.mark.parametrize(
     ("integrator", "flag", "left"),
     [
@@ -46,15 +55,11 @@ def test_torques_of_every_integrator_become_those_of_the_motion(load_robot, inte
     """Inverse dynamics of the positions, by MuJoCo, is another route than its step; errors are over what is corrected."""
     robot = load_robot(ARM.format(integrator, flag))
     q, tau = simulated(robot.model)
-    motion = [q]
-    for _ in range(4):
-        motion.append(slope(motion[-1]))
-    inner = slice(500, -20)
-    expected = inverse_dynamics(robot, *motion[:3]) + coulomb_torque(robot, motion[1])
+    motion, expected = of_positions(robot, q)
     extra = torque_of_steps(robot, motion)
-    off = np.sqrt(np.mean(((tau - extra) - expected)[inner] ** 2, axis=0) / np.mean(tau[inner] ** 2, axis=0))
+    off = np.sqrt(np.mean(((tau - extra) - expected)[INNER] ** 2, axis=0) / np.mean(tau[INNER] ** 2, axis=0))
     assert (off < left).all()
-    before = np.sqrt(np.mean((tau - expected)[inner] ** 2, axis=0) / np.mean(tau[inner] ** 2, axis=0))
+    before = np.sqrt(np.mean((tau - expected)[INNER] ** 2, axis=0) / np.mean(tau[INNER] ** 2, axis=0))
     assert (before > 10 * off).all()
 
 
@@ -62,13 +67,9 @@ def test_a_control_of_runge_kutta_acts_in_the_middle_of_its_step_with_what_it_me
     """Torques of the motion half a step later, by the mean of two instants; positions are exact to the fourth order."""
     robot = load_robot(ARM.format("RK4", ""))
     q, tau = simulated(robot.model)
-    motion = [q]
-    for _ in range(4):
-        motion.append(slope(motion[-1]))
-    inner = slice(500, -20)
-    expected = inverse_dynamics(robot, *motion[:3]) + coulomb_torque(robot, motion[1])
+    motion, expected = of_positions(robot, q)
     expected = (expected + np.roll(expected, -1, axis=0)) / 2
-    off, before = (np.sqrt(np.mean((x - expected)[inner] ** 2, axis=0)) for x in (tau - torque_of_steps(robot, motion), tau))
+    off, before = (np.sqrt(np.mean((x - expected)[INNER] ** 2, axis=0)) for x in (tau - torque_of_steps(robot, motion), tau))
     assert acting_late(robot) == H / 2
     assert (off < 0.05 * before).all()
 
