@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from idbench.experiments.cli import main
+from idbench.identify.estimators.settle import SETTLED
 from idbench.sim.robot.inverse_dynamics import coulomb_torque, inverse_dynamics
 from idbench.sim.robot.robot import Robot
 
@@ -71,8 +72,11 @@ def found(folder, name, way, out, capsys):
 @pytest.mark.thorough
 @pytest.mark.parametrize("way", WAYS)
 def test_names_and_order_change_no_number(both, way, tmp_path, capsys):
-    """To a thousandth of sigma; ML to a fiftieth, at which its iterations stop."""
-    near = 0.02 if "ML" in WAYS[way] else 1e-3
+    """To a thousandth of sigma; ML to a fiftieth, at which its iterations stop.
+
+    Shapes of friction iterate until a step is below a thousandth (`SETTLED`): the two may stop on either side of the minimum.
+    """
+    near = {"rotors": 0.02, "stribeck": 2 * SETTLED}.get(way, 1e-3)
     (one, names, joints), (two, others, order) = (found(both, name, way, tmp_path, capsys) for name in ("one", "two"))
     assert set(names) == set(others)
     places = [others.index(name) for name in names]
