@@ -53,6 +53,9 @@ def suspect_summary(suspect: Suspect, joints: Sequence[str], unit: str, remedy: 
 LARGE, ABOUT = 6.0, 0.05
 """Factor from which on a torque is said to be so many times too large, and the decades by which one of 1000 may be off."""
 
+BEYOND, MOST_BAND = 1.25, 0.4
+"""Band of rows over the frequency of a ripple that they are to have, as their filter has a transition; and over fs, at most."""
+
 LENGTHS = frozenset({"tilt", "axis", "eccentric", "cogging", "commutation", "base_motion"})
 """Causes of two sizes across each other, whose length is reported."""
 
@@ -156,6 +159,11 @@ class Cause:
             return texts[0]
         return " ".join([own or "none", *(f"{said(j, joints)}={text}" for j, text in enumerate(texts) if more[j])])
 
+    def _cutoff(self) -> str:
+        """The option by which rows have the ripples that are above their band; empty where samples hardly have them."""
+        band = max(BEYOND * each.band for each in self.every or (self.suspect,))
+        return f" --cutoff {np.ceil(band):.0f}" if 0 < band < MOST_BAND * self.log.fs else ""
+
     def _gains(self) -> str:
         """The option that mends all torques, in as many ways as the log cannot tell apart."""
         n = len(self.robot_model.robot.joints)
@@ -208,6 +216,7 @@ class Cause:
             "faster": "faster" if s.size[0] > 0 else "slower",
             "axis": "xyz"[int(s.setting)] if s.cause == "length" else "",
             "laws": self._laws(),
+            "cutoff": self._cutoff(),
             "gains": self._gains(),
             "delay": "joints" if s.joint is not None else "estimate",
             "coupling": f"motor{last + 1}={joints[j]}+{joints[last]}",

@@ -1,5 +1,6 @@
 """The laws of friction that suit logs, and why."""
 
+from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import asdict, replace
 from typing import Any
@@ -18,6 +19,7 @@ from idbench.identify.basis.of_joints import OfJoints
 from idbench.identify.blame import blamed
 from idbench.identify.estimators.settle import settled
 from idbench.identify.judge.friction_choice import FrictionChoice, choose_friction
+from idbench.identify.judge.ripples import likely_waves
 from idbench.identify.models import ExplicitModel
 from idbench.identify.rows.rows import Rows
 from idbench.identify.signals.masks import NoMask
@@ -61,7 +63,7 @@ def chosen_friction(request: Request, logs: tuple[MotionLog, ...], most: int | N
     candidates = {name: law_of(name) for name in COMPARED if seen.get(name, True)}
     with blamed():
         problem = Problem(logs, robot_model.basis, ExplicitModel(), request.processing)
-        choice = choose_friction(problem, candidates, most=most)
+        choice = choose_friction(problem, {**candidates, **_ripples(problem)}, most=most)
     # A motor that turns with several joints has the laws that all of them have: theirs stay.
     turned = {j for coupling in robot_model.tree.couplings for j, weight in enumerate(coupling.weights) if weight}
     choice = replace(choice, idle=tuple(() if j in turned else own for j, own in enumerate(choice.idle)))
@@ -69,6 +71,20 @@ def chosen_friction(request: Request, logs: tuple[MotionLog, ...], most: int | N
         robot_model.asked, friction=robot_model.laws.chosen(choice.laws, choice.idle).texts(robot_model.robot.joints)
     )
     return replace(request, robot_model=replace(robot_model, asked=asked)), choice
+
+
+def _ripples(problem: Problem) -> dict[str, OfJoints]:
+    """Cogging of the waves that residuals of each hinge have most of."""
+    cutoff = getattr(problem.own_chain.operator, "cutoff", None)
+    if cutoff is None or problem.long or problem.logs[0].poses:
+        return {}
+    e = problem.rows.Y - problem.rows.predicted(problem.factors.fit(2).X)
+    joints = defaultdict[str, list[int]](list)
+    hinges = [j for j in range(problem.basis.n) if j not in problem.basis.slides]
+    sizes = [np.ones(part.signals.state.q.shape) for part in problem.parts]
+    for j, k in likely_waves(problem.parts, e, sizes, cutoff, hinges, apart=0):
+        joints[f"cogging:{k}"].append(j)
+    return {name: OfJoints(law_of(name), tuple(own)) for name, own in joints.items()}
 
 
 def chosen_in_turns(request: Request, logs: Logs) -> tuple[Request, Logs, FrictionChoice]:

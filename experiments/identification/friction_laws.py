@@ -125,7 +125,7 @@ def _laws(text: str, laws: str) -> tuple[str, ...]:
         )
     if "none" in terms and len(terms) > 1:
         raise ExperimentError(f"--friction {text}: none is no friction at all: leave out none, or the others")
-    kinds = [term.partition(":")[0] for term in terms]
+    kinds = [term if term.startswith("cogging:") else term.partition(":")[0] for term in terms]
     if again := next((kind for kind in kinds if kind and kinds.count(kind) > 1), ""):
         raise ExperimentError(f"--friction {text}: {again} is given twice in the sum: leave one out")
     found = tuple(dict.fromkeys(chain(*(GROUPS.get(name, (name,)) for name in laws.split("+")))))

@@ -112,8 +112,9 @@ def notes_of(made: Fit) -> tuple[str, ...]:
 
 def truth_of(asked: IdentifyRequest, request: Request) -> dict[str, float] | None:
     """Return the truth that the folder of a run states, if it is of the same parameters."""
-    truth: dict[str, float] | None = stated_by(asked.log[0]).get("truth")
-    return truth if truth and tuple(truth) == request.robot_model.basis.names else None
+    stated = stated_by(asked.log[0])
+    truth: dict[str, float] | None = stated.get("truth")
+    return truth | stated["further_truth"] if truth and tuple(truth) == request.robot_model.basis.names else None
 
 
 def chooses_band(asked: IdentifyRequest) -> bool:

@@ -51,8 +51,10 @@ def stated_by(log: Path) -> dict[str, Any]:
         stated = json.loads(path.read_text())
         names, values = stated["parameters"], stated["truth"]
         known = None if values is None else dict(zip(names, map(float, values), strict=True))
-        return {"robot": str(stated.get("robot") or stated["scenario"]["robot"]), "truth": known}
-    except (ValueError, KeyError, TypeError, OSError, RecursionError) as error:
+        others = {str(name): float(x) for name, x in stated.get("further_truth", {}).items()}
+        robot = str(stated.get("robot") or stated["scenario"]["robot"])
+        return {"robot": robot, "truth": known, "further_truth": others}
+    except (ValueError, KeyError, TypeError, AttributeError, OSError, RecursionError) as error:
         raise ExperimentError(f"{path} is no summary of a run ({error}): name the log itself, {log / 'log.parquet'}") from error
 
 

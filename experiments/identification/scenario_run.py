@@ -61,7 +61,8 @@ class ScenarioRun:
     def fit(self) -> Fit:
         """What the models make of its log."""
         robot, friction = self.run.robots[0], self.scenario.friction
-        truth, log = friction.truth(robot) | self.request.robot_model.truth(robot, friction), self.run.alone()
+        truth, log = self.request.robot_model.truth(robot, friction), self.run.alone()
+        truth |= friction.truth(robot) | self.scenario.ripple.truth(robot)
         if not np.any(log.tau):
             step = max(self.scenario.torque.resolution)
             coarse = (
@@ -88,6 +89,7 @@ class ScenarioRun:
             "seed": self.scenario.seed,
             "scenario": to_dict(self.scenario),
             **self.fit.summary(),
+            "further_truth": {name: x for name, x in (self.fit.logs.truth or {}).items() if name not in self.fit.basis.names},
             "iterations": iterations(self.fit),
             **({} if self.rejection is None else {"rejection_rms": self.rejection.rejected.std(axis=0).tolist()}),
         }

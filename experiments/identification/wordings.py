@@ -78,7 +78,7 @@ WORDINGS: Mapping[tuple[str, str], Wording] = {
         "friction with hysteresis after reversals (pre-sliding)", by="take a larger --mask-speed, or longer strokes"
     ),
     ("cogging", "drive"): Wording(
-        "cogging of {setting:g} waves a turn, {size}", "--friction {laws}", law="cogging:{setting:g}"
+        "cogging of {setting:g} waves a turn, {size}", "--friction {laws}{cutoff}", law="cogging:{setting:g}"
     ),
     ("commutation", "drive"): Wording(
         "torque constant with a ripple of {setting:g} waves a turn, {size}", by="correct currents by a table over the position"

@@ -10,7 +10,8 @@ from idbench.identify.arrays import TINY, Array
 from idbench.identify.basis.block import Kind
 from idbench.identify.data.motion_log import MotionLog, never_logged
 from idbench.identify.estimators.problem import Problem
-from idbench.identify.judge.small_mistakes import small_mistakes
+from idbench.identify.judge.ripples import fast_ripples
+from idbench.identify.judge.small_mistakes import CERTAIN, PROOF, small_mistakes
 from idbench.identify.judge.stretches import variance_of_sums
 from idbench.identify.judge.suspect import Suspect
 from idbench.identify.judge.torque_gains import DECISIVE, mean_inertias
@@ -54,6 +55,10 @@ def diagnosed(problem: Problem, X: Array) -> tuple[Suspect, ...]:
         small = small_mistakes(mended, X)
     there = {(each.cause, each.joint) for each in whole}
     found = [*whole, *(each for each in small if (each.cause, each.joint) not in there)]
+    there |= {(each.setting, each.joint) for each in small}
+    cutoff = getattr(problem.own_chain.operator, "cutoff", None)
+    fast = fast_ripples(mended, X, cutoff, CERTAIN, PROOF) if cutoff else ()
+    found += [each for each in fast if (each.setting, each.joint) not in there]
     # Of a joint that something else is wrong with, friction may be negative, too.
     doubted = {each.joint for each in found}
     return (*(sign for sign in _impossible_signs(mended, X) if sign.joint not in doubted), *found)

@@ -92,7 +92,8 @@ class HeldOutProducts:
             basis = basis + made
             for j in made.joints:
                 own = [first + i for i, parameter in enumerate(made.parameters(basis.n)) if parameter.joint == j]
-                places[law, j] = [[i] for i in own] if isinstance(shaped, Candidates) else [own]
+                if own:  # a law may be one of some joints
+                    places[law, j] = [[i] for i in own] if isinstance(shaped, Candidates) else [own]
         basis = basis + _Speed()
         rows = start.with_basis(basis).rows
         joined = np.swapaxes(rows.joined.reshape(-1, rows.kinds, len(basis.names) + 1), 0, 1)

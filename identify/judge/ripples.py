@@ -1,22 +1,29 @@
 """Ripples of joints' torques: of which numbers of waves a turn residuals have most."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from idbench.identify.arrays import TINY, Array
+from idbench.identify.basis.newton_euler import torques
 from idbench.identify.estimators.log_rows import LogRows, split_by_log
+from idbench.identify.estimators.problem import Problem
+from idbench.identify.judge.suspect import Suspect
+from idbench.identify.signals.prefilters import NoPrefilter
 
 WAVES = np.arange(1, 91)
 """Waves a turn that are looked for: a cable has 1, harmonic drives 2, motors of 6 to 90 slots without a gear as many."""
 
 LIKELY = 2  # Numbers of waves that residuals have most of, for each joint, whose columns are made
 APART = 2  # Waves about these whose columns are made, too: parameters have taken a part of what residuals had
+STRETCHES = 10  # Of the samples: the others predict the ripple of each
+ENOUGH = 5000  # Samples of a log that are looked at: a ripple of 2 % of a torque with 5 % of noise is 28 sigma of so many
 SEEN = 0.02  # Share of the motion in which a wave must be within the band of the rows
 
 
 def likely_waves(
-    parts: Sequence[LogRows], e: Array, sizes: Sequence[Array], cutoff: float, hinges: Sequence[int]
+    parts: Sequence[LogRows], e: Array, sizes: Sequence[Array], cutoff: float, hinges: Sequence[int], apart: int = APART
 ) -> Iterator[tuple[int, int]]:
     """Yield hinges, each with numbers of waves a turn that residuals may have most of.
 
@@ -36,32 +43,137 @@ def likely_waves(
         Band of the rows, f_c [Hz].
     hinges : sequence of int
         The joints that are looked at.
+    apart : int
+        Waves about these that are yielded, too.
     """
     every = zip(parts, split_by_log(e, parts), sizes, strict=True)
     scores = np.sum([_scores(part, own, x, cutoff) for part, own, x in every], axis=0)
     for j in hinges:
         likely, score = set[int](), scores[j]
         for _ in range(LIKELY):
-            near = np.abs(WAVES - WAVES[score.argmax()]) <= APART
+            away = np.abs(WAVES - WAVES[score.argmax()])
             if score.max() > TINY:
-                likely |= set(WAVES[near].tolist())
-            score[near] = 0.0
+                likely |= set(WAVES[away <= apart].tolist())
+            score[away <= APART] = 0.0
         yield from ((j, k) for k in sorted(likely))
 
 
 def _scores(part: LogRows, e: Array, size: Array, cutoff: float) -> Array:
     """Score of each number of waves in one log, shape (joint, wave)."""
-    state, fs, rows = part.signals.state, part.signals.fs, part.rows
-    t, inside = np.arange(state.q.shape[-1]) / fs, rows.maps[0].inside
-    found = np.zeros((len(size), len(WAVES)))
-    for j, x in enumerate(inside * size):
-        own = rows.group == j
-        left, squares = np.interp(t, rows.time[own], e[own]) * x, x**2
-        phase = np.exp(1j * state.q[j])
-        wave = phase ** WAVES[0]
-        for i, k in enumerate(WAVES):
-            seen = float(np.sum(squares[k * np.abs(state.qd[j]) < 2 * np.pi * cutoff]))
-            if seen > SEEN * np.sum(squares):
-                found[j, i] = np.abs(left @ wave) ** 2 / seen
-            wave = wave * phase
+    state, rows = part.signals.state, part.rows
+    t, inside = np.arange(state.q.shape[-1]) / part.signals.fs, rows.maps[0].inside
+    every = [np.interp(t, rows.time[rows.group == j], e[rows.group == j]) for j in range(len(size))]
+    return np.stack([_of_joint(part, j, x, inside[j] * size[j], (0.0, cutoff)) for j, x in enumerate(every)])
+
+
+def _of_joint(part: LogRows, j: int, e: Array, size: Array, band: tuple[float, float]) -> Array:
+    """Score of each number of waves in a signal of one joint, of the instants at which it is in a band [Hz], shape (wave,)."""
+    state, (low, high) = part.signals.state, 2 * np.pi * np.array(band)
+    left, squares, found = e * size, size**2, np.zeros(len(WAVES))
+    phase, speed, every = np.exp(1j * state.q[j]), np.abs(state.qd[j]), np.sum(squares)
+    wave = phase ** WAVES[0]
+    for i, k in enumerate(WAVES):
+        at = (k * speed >= low) & (k * speed < high)
+        seen = float(np.sum(squares[at]))
+        if seen > SEEN * every:
+            # All rows count: what they have of faster waves is none of their own.
+            found[i] = np.abs((left[at] if low else left) @ (wave[at] if low else wave)) ** 2 / seen
+        wave = wave * phase
+    return found
+
+
+def fast_ripples(problem: Problem, X: Array, cutoff: float, certain: float, proof: float) -> Iterator[Suspect]:
+    """Yield ripples of hinges that rows have not, as they are above their band: samples of the torque have them.
+
+        z_b = 2 sum e(t) x(t) exp(i k q(t)) / sum x(t)^2   over the instants of stretch b with k |qd| > 2 pi f_c
+
+    Scores of waves that are not there scatter as chi squared with two degrees of freedom, with the median of them all.
+
+    Parameters
+    ----------
+    problem : Problem
+        Of one run, whose rows are kept.
+    X : Array, shape (p,)
+        Its estimate.
+    cutoff : float
+        Band of the rows, f_c [Hz].
+    certain : float
+        Probability that any wave of any joint seems as significant by chance, below which one is suspected.
+    proof : float
+        Share of the squares of z_b that the mean of the other stretches may leave, and of residuals beyond noise.
+    """
+    parts = problem.explicit.parts
+    torque = [torques(problem.basis, part.signals.state, X) for part in parts]
+    measured = (replace(part.signals, prefilter=NoPrefilter()).torque.mean for part in parts)
+    left = [tau - x for tau, x in zip(measured, torque, strict=True)]
+    kinds = ("cogging", "N m", [np.ones_like(x) for x in torque]), ("commutation", "1", torque)
+    hinges = [j for j in range(problem.basis.n) if j not in problem.basis.slides]
+    for j in hinges if not problem.logs[0].poses else ():
+        e, own = [x[j] for x in left], np.linalg.norm(np.concatenate([x[j] for x in torque]))
+        noise, found, first = sum(float(np.sum(np.diff(x, 2) ** 2)) / 6 for x in e), list[Suspect](), _squares(e)
+        for _ in range(LIKELY):
+            each = ((_fastest(parts, j, e, [x[j] for x in sizes], cutoff), *kind) for *kind, sizes in kinds)
+            (score, p, k, waves), cause, unit = max(each, key=lambda one: one[0][0])
+            z = np.concatenate([_by_stretch(x, wave) for x, wave in zip(e, waves, strict=True)])
+            ripple, others, p = z.mean(), (z.sum() - z) / max(len(z) - 1, 1), len(hinges) * p
+            if p > certain or len(z) < STRETCHES or np.sum(np.abs(z - others) ** 2) > proof * np.sum(np.abs(z) ** 2):
+                break
+            before, e = e, [x - (ripple.conjugate() * wave).real for x, wave in zip(e, waves, strict=True)]
+            errors = 100 * np.sqrt(_squares(before)) / own, 100 * np.sqrt(_squares(e)) / own
+            size, sigma = float(np.abs(ripple)), float(np.std(np.abs(z), ddof=1) / np.sqrt(len(z)))
+            top = k / (2 * np.pi) * max(float(np.abs(part.signals.state.qd[j]).max()) for part in parts)
+            place = cause, "drive", j, (size,), (sigma,), unit
+            found.append(Suspect(*place, p, size / sigma, (), errors, score, float(k), top))
+        # What is left beyond white noise, of which squares of second differences have six times as much.
+        yield from found if _squares(e) - noise < proof * (first - noise) else ()
+
+
+def _squares(e: Sequence[Array]) -> float:
+    return sum(float(np.sum(x**2)) for x in e)
+
+
+def _fastest(
+    parts: Sequence[LogRows], j: int, e: Sequence[Array], sizes: Sequence[Array], cutoff: float
+) -> tuple[float, float, int, list[Array]]:
+    """Score of the wave that samples above the band have most of, its probability by chance, its number, and x exp(i k q)."""
+    band = cutoff, np.inf
+    scores = np.sum([_of_joint(*each, band) for each in zip(parts, [j] * len(e), e, sizes, strict=True)], axis=0)
+    i, usual = int(scores.argmax()), float(np.median(scores[scores > 0])) if scores.any() else 0.0
+    score = float(scores[i]) * 2 * np.log(2) / max(usual, TINY)
+    k, waves = int(WAVES[i]), list[Array]()
+    for part, x in zip(parts, sizes, strict=True):
+        state = part.signals.state
+        waves.append(np.where(k * np.abs(state.qd[j]) >= 2 * np.pi * cutoff, x, 0.0) * np.exp(1j * k * state.q[j]))
+    return score, 2 * len(WAVES) * float(np.exp(-score / 2)), k, waves
+
+
+def _by_stretch(e: Array, wave: Array) -> Array:
+    """z_b of each stretch of a log, shape (stretch,)."""
+    seen = np.flatnonzero(wave)
+    every = np.array_split(seen, STRETCHES) if len(seen) > STRETCHES else [seen]
+    return np.array([2 * np.sum(e[at] * wave[at]) / max(float(np.sum(np.abs(wave[at]) ** 2)), TINY) for at in every])
+
+
+def _scores(part: LogRows, e: Array, size: Array, cutoff: float) -> Array:
+    """Score of each number of waves in one log, shape (joint, wave)."""
+    state, rows = part.signals.state, part.rows
+    t, inside = np.arange(state.q.shape[-1]) / part.signals.fs, rows.maps[0].inside
+    every = [np.interp(t, rows.time[rows.group == j], e[rows.group == j]) for j in range(len(size))]
+    return np.stack([_of_joint(part, j, x, inside[j] * size[j], (0.0, cutoff)) for j, x in enumerate(every)])
+
+
+def _of_joint(part: LogRows, j: int, e: Array, size: Array, band: tuple[float, float]) -> Array:
+    """Score of each number of waves in a signal of one joint, of the instants at which it is in a band [Hz], shape (wave,)."""
+    state, (low, high) = part.signals.state, 2 * np.pi * np.array(band)
+    # Of rows all instants count: what they have where a wave is above their band is none of its own.
+    some = slice(None, None, max(1, len(e) // ENOUGH) if low else 1)
+    left, squares, found = (e * size)[some], size[some] ** 2, np.zeros(len(WAVES))
+    phase, speed, every = np.exp(1j * state.q[j, some]), np.abs(state.qd[j, some]), np.sum(squares)
+    wave = phase ** WAVES[0]
+    for i, k in enumerate(WAVES):
+        at = (k * speed >= low) & (k * speed < high)
+        seen = float(np.sum(squares[at]))
+        if seen > SEEN * every:
+            found[i] = np.abs((left * at if low else left) @ wave) ** 2 / seen
+        wave = wave * phase
     return found

@@ -260,6 +260,7 @@ class _Search:
             errors,
             best.gain,
             candidate.mistake.setting,
+            0.0,
             *self.rows.place(candidate.instant),
             gains=self._ways(best),
             explained=candidate.plain @ best.size - self._plain @ self._absorbed(candidate.white @ best.size),

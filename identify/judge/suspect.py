@@ -34,6 +34,8 @@ class Suspect:
     """What it takes of minus twice the logarithm of the likelihood."""
     setting: float = 0.0
     """Of a ripple: waves a turn; of a length: along which axis."""
+    band: float = 0.0
+    """Highest frequency of a ripple that is above the band of the rows [Hz]; 0 of others."""
     instant: float | None = None
     """When it happened in a log, or from when on it is there [s]."""
     log: int | None = None

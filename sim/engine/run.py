@@ -46,7 +46,7 @@ class Run:
 
     @property
     def truth(self) -> dict[str, float]:
-        """The true standard parameters of the first robot, with the friction of the scenario, by name.
+        """The true standard parameters of the first robot, with friction and cogging of the scenario, by name.
 
         `BaseParameters.values` groups them.
 
@@ -57,7 +57,7 @@ class Run:
         0.5
         """
         robot, friction = self.robots[0], self.scenario.friction
-        return standard_parameters(robot) | friction.truth(robot)
+        return standard_parameters(robot) | friction.truth(robot) | self.scenario.ripple.truth(robot)
 
     def alone(self, i: int = 0) -> MotionLog:
         """Return the log of simulation `i` by itself."""

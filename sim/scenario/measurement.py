@@ -123,6 +123,15 @@ class Ripple:
         """Whether there is none."""
         return not (self.cogging or any(self.commutation))
 
+    def truth(self, robot: Robot) -> dict[str, float]:
+        """Parameters of the cogging as friction that resists, C36s sin(36 q) + C36c cos(36 q), by name [N m]."""
+        series, found = self.start(robot)[0], dict[str, float]()
+        for j, (size, order, phase) in enumerate(zip(series.amplitude, series.order, series.phase, strict=True)):
+            for k, share in enumerate(series.harmonics if size else (), 1):
+                found[f"C{k * order:g}s{j + 1}"] = 0.0 - float(size * share * np.cos(k * phase))
+                found[f"C{k * order:g}c{j + 1}"] = 0.0 - float(size * share * np.sin(k * phase))
+        return found
+
     def start(self, robot: Robot) -> "tuple[RippleSeries, RippleSeries]":
         """Return cogging torque [N m], and torque constant over its mean, minus 1; motors are only asked for if there is any.
 

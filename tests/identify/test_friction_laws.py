@@ -78,7 +78,7 @@ SHAPED = {
     "load": (lambda q, qd, load: 0.08 * np.abs(load) * np.sign(qd), {"Fl1": 0.08, "Fl2": 0.08}),
     "asymmetric-viscous": (lambda q, qd, load: 0.04 * np.abs(qd), {"Fva1": 0.04, "Fva2": 0.04}),
     "offset": (lambda q, qd, load: 0.04 * np.ones_like(qd), {"off1": 0.04}),
-    "cogging": (lambda q, qd, load: 0.1 * np.sin(12 * q) - 0.05 * np.cos(12 * q), {"Cs1": 0.1, "Cc2": -0.05}),
+    "cogging": (lambda q, qd, load: 0.1 * np.sin(12 * q) - 0.05 * np.cos(12 * q), {"C12s1": 0.1, "C12c2": -0.05}),
 }
 
 

@@ -99,7 +99,7 @@ def arctan() -> ShapedFriction:
 
 @dataclass(frozen=True)
 class Cogging(AbstractJointLaw):
-    """Cogging of a known period, Cs sin(periods q) + Cc cos(periods q)."""
+    """Cogging of a known period, such as of 12 waves: C12s sin(12 q) + C12c cos(12 q); a sum may have several."""
 
     asks: ClassVar[str] = "the number of periods in a turn of the joint, such as cogging:12"
 
@@ -110,12 +110,13 @@ class Cogging(AbstractJointLaw):
         require_positive(periods=self.periods)
 
     def letters(self) -> Mapping[str, tuple[Kind, str]]:
-        """Return Cs and Cc."""
-        return {"Cs": ("other", "N m"), "Cc": ("other", "N m")}
+        """Return C12s and C12c."""
+        return {f"C{self.periods:g}{part}": ("other", "N m") for part in "sc"}
 
     def torques(self, state: State) -> Mapping[str, Array]:
         """Return sine and cosine."""
-        return {"Cs": np.sin(self.periods * state.q), "Cc": np.cos(self.periods * state.q)}
+        waves = np.sin(self.periods * state.q), np.cos(self.periods * state.q)
+        return dict(zip(self.letters(), waves, strict=True))
 
 
 @dataclass(frozen=True)
