@@ -10,7 +10,7 @@ from idbench.sim import load_scenario, run
 ROTOR = """<mujoco><worldbody><body><joint name="shaft" axis="0 0 1"/><inertial pos="0 0 0" mass=".1"
   diaginertia="1e-4 1e-4 1e-4"/></body></worldbody></mujoco>"""
 
-FS, I, FV, FS1, NOISE = 250.0, 1e-4, 2e-3, 0.02, 2e-3
+FS, IA, FV, FS1, NOISE = 250.0, 1e-4, 2e-3, 0.02, 2e-3
 
 
 @pytest.fixture(scope="module")
@@ -27,7 +27,7 @@ def log_of(ripple, seed=0, seconds=40.0):
     turn = np.tanh(np.sin(2 * np.pi * t / 10) / 0.02)
     qd = speed * turn
     q = np.cumsum(qd) / FS
-    tau = I * np.gradient(qd, 1 / FS) + FV * qd + FS1 * np.sign(qd) + ripple(q) + NOISE * rng.standard_normal(len(t))
+    tau = IA * np.gradient(qd, 1 / FS) + FV * qd + FS1 * np.sign(qd) + ripple(q) + NOISE * rng.standard_normal(len(t))
     return MotionLog(FS, q[:, None], tau[:, None], TorqueChannel("instantaneous"))
 
 
