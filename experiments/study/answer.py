@@ -144,6 +144,24 @@ def _sigmas(cells: Sequence[Cell]) -> str:
     return f"The true value lies within two standard errors in {' and '.join(shares)} of cases; 95 % would be right."
 
 
+HALF = 0.5  # Share of the runs in which a fault is named, from which on it counts as seen
+
+
+def smallest_named(cells: Sequence[Cell], field: str) -> str:
+    """Least value of a setting from which on faults are named in most of the runs, for each combination of the others."""
+    groups, found = dict[str, list[Cell]](), list[str]()
+    for cell in sorted(cells, key=lambda cell: cell.settings[field]):
+        others = [f"{short(name)} {in_words(x)}" for name, x in settings_of(cell).items() if name != field]
+        groups.setdefault(", ".join(others) or "the fault", []).append(cell)
+    for title, group in groups.items():
+        seen = [cell.named_share[0] >= HALF for cell in group]
+        first = next((k for k in range(len(seen)) if all(seen[k:])), None)
+        found.append(f"{title}: {'never' if first is None else f'from {in_words(group[first].settings[field])} on'}")
+    wrong = np.mean([cell.named_share[1] for cell in cells])
+    runs = f"another cause is named in {percent(float(wrong))} of the runs"
+    return f"Faults are named in most runs, by {field}: {'; '.join(found)}. In all, {runs}."
+
+
 def failures(cells: Sequence[Cell]) -> str:
     """Sentence on the number of failed identifications; empty if none did."""
     failed = sum(cell.failed for cell in cells)

@@ -48,6 +48,17 @@ def typical_figure(families: Mapping[str, Sequence[Cell]], axis: Axis, edges: in
     return svg(figure)
 
 
+def named_figure(families: Mapping[str, Sequence[Cell]], axis: Axis) -> str:
+    """Share of the runs whose fault is named as one picture, a row a family of cells, a column a value of an axis."""
+    at = {axis.label(value): k for k, value in enumerate(axis.points)}
+    shares = np.full((len(families), len(at)), np.nan)
+    for row, cells in zip(shares, families.values(), strict=True):
+        for cell in cells:
+            row[at[cell.settings[axis.field]]] = 100 * cell.named_share[0]
+    columns = [in_words(label) for label in at]
+    return matrix_figure([*families], columns, shares, f"runs whose fault is named [%], by {axis.field}", log=False)
+
+
 def error_figure(cells: Sequence[Cell], axis: Axis) -> str:
     """Return spread and bias of every parameter against an axis, a curve a model; of many parameters their rms error."""
     if len(cells[0].parameters) > MANY:

@@ -11,6 +11,7 @@ import numpy as np
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.identification.simulators import RobotPlant, ScenarioLoop
 from idbench.experiments.study.axis import Combination
+from idbench.experiments.study.named_faults import named_faults
 from idbench.experiments.study.servo_rows import SERVO, rows_of
 from idbench.experiments.study.statistics import BOUNDS
 from idbench.experiments.study.study import Study
@@ -166,16 +167,25 @@ def _identify(
         begin = simulation.start if simulation.start is None or simulation.start.ndim < 2 else simulation.start[places]
         logs = [simulated.log.run(([k * len(runs) + i for i in places],)) for k in range(study.most_logs)]
         found = _outcomes(study, combination, simulated, logs, replace(simulation, start=begin))
+        causes = [_causes(study, combination, simulated, i) for i in places]
         for model in study.models:
             outcome = found[model]
             columns = _columns(outcome, truth, own) if isinstance(outcome, Estimate) else {}
             for place, i in enumerate(places):
-                common = _common(study, combination, runs[i], model, simulated.seeds[i])
+                common = _common(study, combination, runs[i], model, simulated.seeds[i]) | causes[place]
                 ends = (simulated.failures.get(i + k * len(runs)) for k in range(study.logs_of(model)))
                 if reason := next(filter(None, ends), None) or _failure(outcome, place):
                     yield common | {"failure": reason}
                 else:
                     yield common | {name: values[place] for name, values in columns.items()}
+
+
+def _causes(study: Study, combination: Combination, simulated: Run, i: int) -> dict[str, float]:
+    """What the doctor says of a run, where the study asks for it."""
+    if not study.causes or i in simulated.failures:
+        return {}
+    robot_model, log = study.subjects[combination.friction], simulated.log.run((i,))
+    return named_faults(combination.method, robot_model, log, simulated.scenario.faults)
 
 
 def _outcomes(

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import scipy
 
+from idbench.experiments.study.named_faults import NAMED
 from idbench.experiments.text import SIGMAS
 from idbench.identify import Array
 
@@ -51,6 +52,8 @@ class Cell:
     """The least standard deviations that noise allows, of a study that asks for them: see `BOUNDS`, shape (runs, p)."""
     simulations: Array | None = None
     """How often the estimator simulated each run, shape (runs,)."""
+    named: Array | None = None
+    """Whether each run's fault was named, and whether another cause was, of a study that asks for causes, shape (2, runs)."""
     shared: np.typing.NDArray[np.bool_] | None = None
     """Parameters that all methods of the study identify; all by default, shape (p,)."""
 
@@ -109,6 +112,14 @@ class Cell:
         if bound not in self.bounds:
             return np.full(len(self.parameters), np.nan)
         return np.sqrt(np.mean((self.bounds[bound] / np.where(self.truth == 0, np.nan, self.truth)) ** 2, axis=0))
+
+    @property
+    def named_share(self) -> tuple[float, float]:
+        """Share of the runs whose fault was named, and of those of which another cause was; NaN if no causes were asked for."""
+        if self.named is None or not self.runs:
+            return np.nan, np.nan
+        right, wrong = self.named.mean(axis=1).tolist()
+        return right, wrong
 
     @property
     def mean_simulations(self) -> float:
@@ -176,6 +187,7 @@ def _cell(
         paper_sigma=of(".paper_sigma"),
         truth=of(".truth"),
         bounds={bound: of(bound) for bound in BOUNDS if parameters[0] + bound in rows},
+        named=np.array([rows[name][ok] for name in NAMED], dtype=np.float64) if NAMED[0] in rows else None,
         simulations=rows["simulations"][ok].astype(np.float64) if "simulations" in rows else None,
         failures=_grouped(rows["failure"][index[failed]], rows["run"][index[failed]]),
     )

@@ -18,6 +18,7 @@ import tomli_w
 from idbench.experiments.errors import ResultsError, StudyError
 from idbench.experiments.results.writing import replace_own
 from idbench.experiments.study.cluster import require_versions, versions
+from idbench.experiments.study.named_faults import NAMED
 from idbench.experiments.study.shard import Shard, parts_of
 from idbench.experiments.study.study import Study
 from idbench.experiments.study.study_file import study_from
@@ -90,6 +91,7 @@ def _schema(study: Study) -> pa.Schema:
     fields += [pa.field(name, pa.string()) for name in ("chain", "estimator", "model", "failure")]
     quality = {"condition_number": pa.float64(), "rows": pa.int64(), "residual_rms": pa.float64(), "simulations": pa.int64()}
     fields += [pa.field(name, kind) for name, kind in quality.items()]
+    fields += [pa.field(name, pa.float64()) for name in NAMED if study.causes]
     return pa.schema(fields + [pa.field(name + part, pa.float64()) for name in study.parameters for part in parts_of(study)])
 
 

@@ -24,6 +24,7 @@ from idbench.experiments.study.axis import (
     servo_methods,
     whole_first,
 )
+from idbench.experiments.study.named_faults import NAMED
 from idbench.experiments.study.servo_rows import SERVO, names_of
 from idbench.identify import MODELS, AbstractModel
 from idbench.identify.models import THREE, rows_per_sample
@@ -38,8 +39,23 @@ MOST_POINTS = 1_000_000
 
 MOST_METHODS = 1000  # Identifications of every run, above which axes are taken for a slip
 
-RESULTS = ("run", "seed", "chain", "estimator", "model", "failure", "condition_number", "rows", "residual_rms", "simulations")
+RESULTS = (
+    "run",
+    "seed",
+    "chain",
+    "estimator",
+    "model",
+    "failure",
+    "condition_number",
+    "rows",
+    "residual_rms",
+    "simulations",
+    *NAMED,
+)
 """Columns of the results beside those of axes and parameters."""
+
+SEVERITY = "severity"
+"""The axis of how large faults are."""
 
 Names = Annotated[tuple[str, ...], Field(min_length=1)]
 
@@ -88,6 +104,8 @@ class Study:
     """simulated: closed loops; ideal: robots that follow their motions exactly, with exact sensors."""
     realizations: Annotated[Whole, Field(ge=1)] = 1
     """Logs of every run: the same motion, repeated with independent noise, in one fit."""
+    causes: Truth = False
+    """Whether the doctor is asked of every run: how often does it name the faults of the scenario?"""
     rows: Literal["own", "equal"] = "own"
     """equal: models with one row per instant, power and energy, get n times the logs of n joints, and all models leave out
     the same time at the ends of a log; own: all models get the same logs."""
@@ -118,6 +136,8 @@ class Study:
             _ = self.created_models, self.subjects
         if taken := [axis.field for axis in self.axes if axis.cases and axis.field in self.parameters]:
             raise StudyError(f"an axis of cases is called {taken[0]}, which is a parameter: give it another name")
+        if self.causes and self.of_servos:
+            raise StudyError("causes = true does not go with a study of servos")
         self._require_realizations()
         self._require(next(self._points()))  # the whole grid is looked at when it is known not to be endless
 
@@ -215,6 +235,11 @@ class Study:
     def created_models(self) -> dict[str, AbstractModel]:
         """The models, by name."""
         return {name: MODELS.create(name) for name in self.models}
+
+    @property
+    def main_axis(self) -> Axis:
+        """The axis with the most values, of a study of causes the severity of the faults: figures are drawn against it."""
+        return max(self.every_axis, key=lambda axis: (self.causes and axis.field == SEVERITY, len(axis.points)))
 
     @property
     def varied(self) -> tuple[str, ...]:

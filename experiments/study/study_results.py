@@ -25,10 +25,18 @@ from idbench.experiments.study.answer import (
     short,
     where,
 )
-from idbench.experiments.study.axis import FRICTION, Axis
+from idbench.experiments.study.axis import FRICTION
 from idbench.experiments.study.cluster import versions
 from idbench.experiments.study.comparison import differences
-from idbench.experiments.study.figures import bars_figure, cost_figure, coverage_figure, error_figure, typical_figure
+from idbench.experiments.study.figures import (
+    bars_figure,
+    cost_figure,
+    coverage_figure,
+    error_figure,
+    named_figure,
+    typical_figure,
+)
+from idbench.experiments.study.named_faults import NAMED
 from idbench.experiments.study.ratios import compares_models, interval, pair_of, ratios, ratios_table, study_answer
 from idbench.experiments.study.statistics import BOUNDS, Cell, cells
 from idbench.experiments.study.store import Store, arrays
@@ -44,16 +52,17 @@ if TYPE_CHECKING:
 
 def report(study: Study, cells: Sequence[Cell], seconds: dict[str, float], folder: Path) -> str:
     """Return the page: question, answer, tables, figures, and how to make it again."""
-    solved, axis = [cell for cell in cells if cell.runs], main_axis(study)
+    solved, axis = [cell for cell in cells if cell.runs], study.main_axis
     alike = families(study, solved)
     return rendered(
         "idbench.experiments.study",
         "report.html.j2",
         study=study,
         methods=len(study.methods),
-        headline="" if compares_models(study) or not solved else headline(solved, study.edges),
+        headline="" if compares_models(study) or not solved or study.causes else headline(solved, study.edges),
         answer=study_answer(study, cells),
-        typical=typical_figure(alike, axis, study.edges) if solved else "",
+        typical=named_figure(alike, axis) if study.causes else typical_figure(alike, axis, study.edges) if solved else "",
+        causes=study.causes,
         axes=[short(name) for name in cells[0].settings],
         overview=[_overview(cell) for cell in cells],
         families=[
@@ -78,14 +87,9 @@ def report(study: Study, cells: Sequence[Cell], seconds: dict[str, float], folde
     )
 
 
-def main_axis(study: Study) -> Axis:
-    """Return the axis with the most values: figures are drawn against it."""
-    return max(study.every_axis, key=lambda axis: len(axis.points))
-
-
 def families(study: Study, cells: Sequence[Cell]) -> dict[str, list[Cell]]:
     """Return the cells that differ only in the main axis and the model, by what they have in common."""
-    main, groups = main_axis(study).field, dict[str, list[Cell]]()
+    main, groups = study.main_axis.field, dict[str, list[Cell]]()
     for cell in cells:
         fixed = [f"{short(name)} {in_words(x)}" for name, x in cell.settings.items() if name != main]
         groups.setdefault(", ".join([*fixed, f"chain {cell.names[0]}", cell.names[1]]), []).append(cell)
@@ -155,14 +159,16 @@ def print_study(page: Console, study: Study, found: Sequence[Cell]) -> None:
     axes = [short(field) for field in study.varied if field != FRICTION] or [""]
     least = ["bound", "through reversals"] if study.bound else []
     often = ["simulations"] if any(cell.mean_simulations for cell in found) else []
-    columns = [*axes[1:], "identified by", "runs", "failed", "typical error", *least, "within 2 sigma", *often]
+    causes = ["named", "another named"] if study.causes else []
+    columns = [*axes[1:], "identified by", "runs", "failed", "typical error", *least, "within 2 sigma", *often, *causes]
     grid = new_table(study.question, columns)
     for cell in found:
         settings = [in_words(x) for x in settings_of(cell).values()] or [""]
         numbers = f"{cell.runs}", f"{cell.failed or ''}"
         bounds = [percent(cell.typical_least(bound)) for bound in BOUNDS] if least else []
         errors = [percent(cell.typical), *bounds] if cell.runs else [""] * (1 + len(least))
-        judged = *errors, _held(cell), *([_often(cell)] if often else [])
+        shares = [percent(share) for share in cell.named_share] if causes else []
+        judged = *errors, _held(cell), *([_often(cell)] if often else []), *shares
         grid.add_row(*settings, method(cell, found), *numbers, *judged)
     grid.columns[0].header = axes[0]
     print_table(page, grid, len(axes) + 1)
@@ -212,6 +218,8 @@ def _cell(cell: Cell) -> dict[str, Any]:
     chain, estimator, model = cell.names
     summary: dict[str, Any] = {"settings": dict(cell.settings), "chain": chain, "estimator": estimator, "model": model}
     summary |= {"runs": cell.runs, "simulations": cell.mean_simulations}
+    if cell.named is not None:
+        summary |= dict(zip(NAMED, map(finite, cell.named_share), strict=True))
     summary |= {"failures": {reason: len(runs) for reason, runs in cell.failures.items()}}
     if cell.runs:
         numbers = {

@@ -55,10 +55,9 @@ def diagnosed(problem: Problem, X: Array) -> tuple[Suspect, ...]:
         small = small_mistakes(mended, X)
     there = {(each.cause, each.joint) for each in whole}
     found = [*whole, *(each for each in small if (each.cause, each.joint) not in there)]
-    there |= {(each.setting, each.joint) for each in small}
-    cutoff = getattr(problem.own_chain.operator, "cutoff", None)
+    cutoff, waves = getattr(problem.own_chain.operator, "cutoff", None), {(each.setting, each.joint) for each in small}
     fast = fast_ripples(mended, X, cutoff, CERTAIN, PROOF) if cutoff else ()
-    found += [each for each in fast if (each.setting, each.joint) not in there]
+    found += [each for each in fast if (each.setting, each.joint) not in waves]
     # Of a joint that something else is wrong with, friction may be negative, too.
     doubted = {each.joint for each in found}
     return (*(sign for sign in _impossible_signs(mended, X) if sign.joint not in doubted), *found)

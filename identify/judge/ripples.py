@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -58,30 +59,6 @@ def likely_waves(
         yield from ((j, k) for k in sorted(likely))
 
 
-def _scores(part: LogRows, e: Array, size: Array, cutoff: float) -> Array:
-    """Score of each number of waves in one log, shape (joint, wave)."""
-    state, rows = part.signals.state, part.rows
-    t, inside = np.arange(state.q.shape[-1]) / part.signals.fs, rows.maps[0].inside
-    every = [np.interp(t, rows.time[rows.group == j], e[rows.group == j]) for j in range(len(size))]
-    return np.stack([_of_joint(part, j, x, inside[j] * size[j], (0.0, cutoff)) for j, x in enumerate(every)])
-
-
-def _of_joint(part: LogRows, j: int, e: Array, size: Array, band: tuple[float, float]) -> Array:
-    """Score of each number of waves in a signal of one joint, of the instants at which it is in a band [Hz], shape (wave,)."""
-    state, (low, high) = part.signals.state, 2 * np.pi * np.array(band)
-    left, squares, found = e * size, size**2, np.zeros(len(WAVES))
-    phase, speed, every = np.exp(1j * state.q[j]), np.abs(state.qd[j]), np.sum(squares)
-    wave = phase ** WAVES[0]
-    for i, k in enumerate(WAVES):
-        at = (k * speed >= low) & (k * speed < high)
-        seen = float(np.sum(squares[at]))
-        if seen > SEEN * every:
-            # All rows count: what they have of faster waves is none of their own.
-            found[i] = np.abs((left[at] if low else left) @ (wave[at] if low else wave)) ** 2 / seen
-        wave = wave * phase
-    return found
-
-
 def fast_ripples(problem: Problem, X: Array, cutoff: float, certain: float, proof: float) -> Iterator[Suspect]:
     """Yield ripples of hinges that rows have not, as they are above their band: samples of the torque have them.
 
@@ -106,45 +83,64 @@ def fast_ripples(problem: Problem, X: Array, cutoff: float, certain: float, proo
     torque = [torques(problem.basis, part.signals.state, X) for part in parts]
     measured = (replace(part.signals, prefilter=NoPrefilter()).torque.mean for part in parts)
     left = [tau - x for tau, x in zip(measured, torque, strict=True)]
-    kinds = ("cogging", "N m", [np.ones_like(x) for x in torque]), ("commutation", "1", torque)
-    hinges = [j for j in range(problem.basis.n) if j not in problem.basis.slides]
-    for j in hinges if not problem.logs[0].poses else ():
-        e, own = [x[j] for x in left], np.linalg.norm(np.concatenate([x[j] for x in torque]))
-        noise, found, first = sum(float(np.sum(np.diff(x, 2) ** 2)) / 6 for x in e), list[Suspect](), _squares(e)
+    hinges = [j for j in range(problem.basis.n) if j not in problem.basis.slides and not problem.logs[0].poses]
+    for j in hinges:
+        e, found, own = [x[j] for x in left], list[Suspect](), [x[j] for x in torque]
+        first, noise = _squares(e), sum(float(np.sum(np.diff(x, 2) ** 2)) / 6 for x in e)
         for _ in range(LIKELY):
-            each = ((_fastest(parts, j, e, [x[j] for x in sizes], cutoff), *kind) for *kind, sizes in kinds)
-            (score, p, k, waves), cause, unit = max(each, key=lambda one: one[0][0])
-            z = np.concatenate([_by_stretch(x, wave) for x, wave in zip(e, waves, strict=True)])
-            ripple, others, p = z.mean(), (z.sum() - z) / max(len(z) - 1, 1), len(hinges) * p
+            kinds = [_fastest(parts, j, e, x, cutoff) for x in ([np.ones_like(x) for x in own], own)]
+            of = int(np.argmax([one.score for one in kinds]))
+            wave, p = kinds[of], len(hinges) * kinds[of].p
+            z = np.concatenate([_by_stretch(x, unit) for x, unit in zip(e, wave.units, strict=True)])
+            others = (z.sum() - z) / max(len(z) - 1, 1)
             if p > certain or len(z) < STRETCHES or np.sum(np.abs(z - others) ** 2) > proof * np.sum(np.abs(z) ** 2):
                 break
-            before, e = e, [x - (ripple.conjugate() * wave).real for x, wave in zip(e, waves, strict=True)]
-            errors = 100 * np.sqrt(_squares(before)) / own, 100 * np.sqrt(_squares(e)) / own
-            size, sigma = float(np.abs(ripple)), float(np.std(np.abs(z), ddof=1) / np.sqrt(len(z)))
-            top = k / (2 * np.pi) * max(float(np.abs(part.signals.state.qd[j]).max()) for part in parts)
-            place = cause, "drive", j, (size,), (sigma,), unit
-            found.append(Suspect(*place, p, size / sigma, (), errors, score, float(k), top))
+            before, e = e, [x - (z.mean().conjugate() * unit).real for x, unit in zip(e, wave.units, strict=True)]
+            before_after = tuple(float(100 * np.sqrt(_squares(x) / max(_squares(own), TINY))) for x in (before, e))
+            found.append(wave.suspect(j, of, z, p, (before_after[0], before_after[1])))
         # What is left beyond white noise, of which squares of second differences have six times as much.
         yield from found if _squares(e) - noise < proof * (first - noise) else ()
 
 
+class _FastWave(NamedTuple):
+    """The wave that samples above a band have most of."""
+
+    score: float
+    p: float
+    """Probability that any wave of the joint has this score by chance."""
+    k: int
+    """Waves a turn."""
+    top: float
+    """Its highest frequency [Hz]."""
+    units: list[Array]
+    """x exp(i k q) in each log, 0 within the band, shape (time,)."""
+
+    def suspect(self, j: int, of: int, z: Array, p: float, held_out: tuple[float, float]) -> Suspect:
+        """The ripple of a joint, by z of each stretch: cogging, or of the torque constant."""
+        cause, unit = (("cogging", "N m"), ("commutation", "1"))[of]
+        size, sigma = float(np.abs(z.mean())), float(np.std(np.abs(z), ddof=1) / np.sqrt(len(z)))
+        t = size / max(sigma, TINY)
+        return Suspect(
+            cause, "drive", j, (size,), (sigma,), unit, p, t, (), held_out, self.score, setting=float(self.k), band=self.top
+        )
+
+
 def _squares(e: Sequence[Array]) -> float:
+    """Sum of squares of a signal in all logs."""
     return sum(float(np.sum(x**2)) for x in e)
 
 
-def _fastest(
-    parts: Sequence[LogRows], j: int, e: Sequence[Array], sizes: Sequence[Array], cutoff: float
-) -> tuple[float, float, int, list[Array]]:
-    """Score of the wave that samples above the band have most of, its probability by chance, its number, and x exp(i k q)."""
-    band = cutoff, np.inf
-    scores = np.sum([_of_joint(*each, band) for each in zip(parts, [j] * len(e), e, sizes, strict=True)], axis=0)
-    i, usual = int(scores.argmax()), float(np.median(scores[scores > 0])) if scores.any() else 0.0
-    score = float(scores[i]) * 2 * np.log(2) / max(usual, TINY)
-    k, waves = int(WAVES[i]), list[Array]()
-    for part, x in zip(parts, sizes, strict=True):
-        state = part.signals.state
-        waves.append(np.where(k * np.abs(state.qd[j]) >= 2 * np.pi * cutoff, x, 0.0) * np.exp(1j * k * state.q[j]))
-    return score, 2 * len(WAVES) * float(np.exp(-score / 2)), k, waves
+def _fastest(parts: Sequence[LogRows], j: int, e: Sequence[Array], sizes: Sequence[Array], cutoff: float) -> _FastWave:
+    """The wave that samples above the band have most of."""
+    each = zip(parts, e, sizes, strict=True)
+    scores = np.sum([_of_joint(part, j, x, size, (cutoff, np.inf)) for part, x, size in each], axis=0)
+    usual = float(np.median(scores[scores > 0])) if scores.any() else TINY
+    score, k = 2 * np.log(2) * float(scores.max()) / usual, int(WAVES[scores.argmax()])
+    states = [part.signals.state for part in parts]
+    outside = [k * np.abs(state.qd[j]) >= 2 * np.pi * cutoff for state in states]
+    units = [at * x * np.exp(1j * k * s.q[j]) for at, x, s in zip(outside, sizes, states, strict=True)]
+    top = k / (2 * np.pi) * max(float(np.abs(state.qd[j]).max()) for state in states)
+    return _FastWave(score, 2 * len(WAVES) * float(np.exp(-score / 2)), k, top, units)
 
 
 def _by_stretch(e: Array, wave: Array) -> Array:

@@ -72,7 +72,7 @@ def faulty(run: Run) -> Run:
     for i, seed in enumerate(run.seeds):
         true = run.q[i], run.qd[i], np.gradient(run.qd[i], 1 / run.log.fs, axis=0)
         rng = np.random.default_rng([seed, FAULTS])
-        logs.append(with_faults(run.robots[i], run.alone(i), true, run.scenario.fault, rng))
+        logs.append(with_faults(run.robots[i], run.alone(i), true, run.scenario.faults, rng))
     q, tau = np.stack([log.q for log in logs]), np.stack([log.tau for log in logs])
     return replace(run, log=replace(run.log, fs=logs[0].fs, q=q, tau=tau))
 

@@ -1,5 +1,6 @@
 """Everything that defines a run, from TOML or Python."""
 
+from dataclasses import replace
 from typing import Annotated, Literal
 
 import numpy as np
@@ -88,6 +89,8 @@ class Scenario:
     """How the plant is integrated."""
     fault: tuple[Fault, ...] = ()
     """What is wrong with the robot or its log, one [[fault]] after the other."""
+    severity: Positive = 1.0
+    """By what the sizes of all faults are multiplied."""
 
     def __post_init__(self) -> None:
         if self.drive.commands != self.controller.commanded:
@@ -97,6 +100,12 @@ class Scenario:
             )
         if self.drive.commands == "position" and self.torque.source == "reference":
             raise ScenarioError("the torque of a servo is commanded by nobody: torque.source must be 'current'")
+        _ = self.faults
+
+    @property
+    def faults(self) -> tuple[Fault, ...]:
+        """The faults as large as they are."""
+        return tuple(replace(fault, size=self.severity * fault.size) for fault in self.fault)
 
     @property
     def real_robot(self) -> Robot:

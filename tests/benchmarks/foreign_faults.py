@@ -15,9 +15,13 @@ from pathlib import Path
 
 import numpy as np
 
+sys.path.insert(0, str(Path(__file__).parent.parent / "identify"))
+
+from faulty_logs import WHEN, less_explained, sizes
+
 import idbench
+from idbench.experiments.study.named_faults import is_named
 from idbench.identify import MotionLog, TorqueChannel
-from idbench.identify.arrays import TINY
 from idbench.sim.robot.inverse_dynamics import coulomb_torque, inverse_dynamics
 from idbench.sim.robot.robot import Robot
 from idbench.sim.scenario.faults import FAULTS, Fault, with_faults
@@ -91,26 +95,6 @@ def motion(robot: Robot, seed: int):
     return (middle + size * q).T, (size * qd).T, (size * qdd).T
 
 
-def sizes(robot: Robot, true, tau, j: int) -> dict[str, float]:
-    """Sizes of faults, from what the joint does."""
-    L, Q, V, A = (float(np.std(x[:, j])) for x in (tau, *true))
-    return {
-        "gain": 0.2, "offset": 0.3 * L, "drift": 0.3 * L / SECONDS, "saturation": 0.6, "falling-constant": 0.3,
-        "dead-band": 0.15 * L, "delay": 0.01, "position-delay": 0.03, "zero": 0.08, "scale": 0.05, "eccentric": 0.03,
-        "coupled-rotor": 0.2 * L / A, "spring": 0.5 * L / Q, "load-friction": 0.15, "stribeck": 0.2 * L,
-        "asymmetry": 0.15 * L / V, "warming": 0.5, "hysteresis": 0.15 * L, "cogging": 0.1 * L, "commutation": 0.1,
-        "backlash": 0.01, "elasticity": 0.02 / L, "push": 3 * L, "unlogged": L, "length": 0.03, "axis": 0.05,
-        "payload": 0.2 * float(robot.model.body_mass[-1]), "tilt": 0.3, "base-motion": 1.0, "rate": 0.1,
-        "clock-drift": 8e-4, "dropouts": 0.05,
-    }  # fmt: skip
-
-
-def shown(clean, faulty) -> float:
-    """What the fault takes from the likelihood of the rows: sum of n ln(share / share) of residuals."""
-    each = [f.squares(f.fit(2).X) / np.maximum(np.sum(f.R[..., -1] ** 2, axis=-1), TINY) for f in (clean, faulty)]
-    return float(np.sum(clean.rows * np.log(each[1] / each[0])))
-
-
 def run(name: str, folder: Path) -> list[tuple[bool, bool, bool, bool]]:
     """Print what is named of each fault; of each whether it is right, honest, false, and can be seen."""
     file = file_of(name, folder)
@@ -122,12 +106,11 @@ def run(name: str, folder: Path) -> list[tuple[bool, bool, bool, bool]]:
     log = MotionLog(FS, np.round(true[0] / step) * step, noisy, TorqueChannel("instantaneous"))
     clean = idbench.fit(log, file, armature="all").fit
     print(f"{name}: without a fault {[cause.short for cause in clean.diagnosis or ()] or 'none'}", flush=True)
-    size, hinge = sizes(robot, true, tau, j), robot.model.jnt_type[j] == 3
+    size, hinge = sizes(true, tau, float(robot.model.body_mass[-1]), j, SECONDS), robot.model.jnt_type[j] == 3
     for kind, flaw in FAULTS.items():
         if kind in HIDDEN or (kind in OF_HINGES and not hinge):
             continue
-        once = {"payload": (8.0, None), "push": (8.0, 8.4)}.get(kind, (0.0, None))
-        fault = Fault(kind, size.get(kind, 0.0), "" if flaw.whole else robot.joints[j], *once)
+        fault = Fault(kind, size.get(kind, 0.0), "" if flaw.whole else robot.joints[j], *WHEN.get(kind, (0.0, None)))
         begin = time.perf_counter()
         wrong = with_faults(robot, log, true, (fault,), np.random.default_rng(3))
         try:
@@ -136,18 +119,10 @@ def run(name: str, folder: Path) -> list[tuple[bool, bool, bool, bool]]:
             print(f"  {kind:20} refused: {error}"[:150], flush=True)
             continue
         found = fit.diagnosis or ()
-        causes = {(c.suspect.cause, c.joint) for c in found[:1]} | {
-            (cause, None if k is None else robot.joints[k]) for c in found[:1] for cause, k in c.suspect.alternatives
-        }
-        near = {flaw.cause[0], *(("tilt",) if flaw.cause[0] == "gravity" else ())}
-        joints = {None, fault.joint, robot.joints[(j + 1) % robot.n]} if "exchanged" in kind else {None, fault.joint}
-        right = any(cause in near and (joint in joints or flaw.whole) for cause, joint in causes)
+        right = bool(found) and is_named(found[0].suspect, robot.joints, [fault])
         honest = not found or found[0].suspect.cause == "unknown"
-        chi2 = (
-            shown(clean.problem.explicit.factors, fit.problem.explicit.factors)
-            if fit.basis.names == clean.basis.names
-            else np.inf
-        )
+        alike = fit.basis.names == clean.basis.names
+        chi2 = less_explained(clean.problem, fit.problem) if alike else np.inf
         results.append((right, honest and not right, not right and not honest, chi2 > SHOWN or right))
         words = "; ".join(cause.words for cause in found[:2]) or "none"
         mark = "right" if right else "honest" if honest else "FALSE"

@@ -11,7 +11,6 @@ from builders import noisy
 
 from idbench.identify import (
     ESTIMATORS,
-    BaseParameters,
     ExplicitModel,
     IdentificationError,
     MotionLog,
@@ -22,16 +21,15 @@ from idbench.identify import (
     identify,
     scara,
 )
-from idbench.identify.basis import tree_basis
 from idbench.identify.judge.delay import estimate_delay
 from idbench.identify.judge.mask_choice import suited_reach
 from idbench.identify.judge.torque_interval import torque_interval
 from idbench.identify.rows.operators import Samples
 
-spec = importlib.util.spec_from_file_location("fault_logs", Path(__file__).parent / "fault_logs.py")
+spec = importlib.util.spec_from_file_location("faulty_logs", Path(__file__).parent / "faulty_logs.py")
 assert spec is not None
 assert spec.loader is not None
-logs = sys.modules.setdefault("fault_logs", importlib.util.module_from_spec(spec))
+logs = sys.modules.setdefault("faulty_logs", importlib.util.module_from_spec(spec))
 spec.loader.exec_module(logs)
 
 ALONE = [name for name in ESTIMATORS.builtin if not {"loop", "plant"} & ESTIMATORS.create(name).needs]
@@ -92,17 +90,14 @@ def test_rank_is_judged_on_the_rows_that_are_solved(log):
 
 def slow_arm(seed, noise=4.8e-4):
     """A log of a slow seven-joint arm whose positions jitter; joint 3 hardly moves."""
-    lab = logs.Lab("panda", seed, 0.02, np.array([0.0, 0.0, -9.81]), speed=0.5)
-    size = np.array([0.5, 0.5, 0.1, 0.5, 0.5, 0.5, 0.5])[:, None]
-    middle = lab.q.mean(axis=1, keepdims=True)
-    lab.q, lab.qd, lab.qdd = middle + size * (lab.q - middle), size * lab.qd, size * lab.qdd
-    told = logs.plain(lab)
-    level = np.sqrt(np.mean(told.tau**2, axis=1, keepdims=True))
-    tau = told.tau + 0.02 * level * lab.rng.standard_normal(told.tau.shape)
-    q = told.q + noise * lab.rng.standard_normal(told.q.shape)
-    return MotionLog(told.fs, q.T, tau.T, TorqueChannel("instantaneous")), BaseParameters.of(
-        told.tree, tree_basis(told.tree)
-    ).basis
+    lab = logs.Lab("panda", seed, speed=0.5)
+    size = np.array([0.5, 0.5, 0.1, 0.5, 0.5, 0.5, 0.5])
+    q, qd, qdd = lab.true
+    middle = q.mean(axis=0)
+    lab.true = middle + size * (q - middle), size * qd, size * qdd
+    tau = lab.tau + 0.02 * np.sqrt(np.mean(lab.tau**2, axis=0)) * lab.rng.standard_normal(q.shape)
+    q = lab.true[0] + noise * lab.rng.standard_normal(q.shape)
+    return MotionLog(logs.FS, q, tau, TorqueChannel("instantaneous")), lab.basis
 
 
 def test_a_slow_joint_with_noisy_positions_keeps_its_rows():
@@ -120,11 +115,8 @@ def test_a_slow_joint_with_noisy_positions_keeps_its_rows():
 @pytest.mark.parametrize("seed", [1, 2])
 def test_a_delay_is_found_to_60_microseconds(seed, late):
     """A six-joint arm with counts of 17 bits and 0.3 % of torque noise, whose torques are logged late."""
-    lab = logs.Lab("puma560", seed, 0.3, np.array([0.0, 0.0, -9.81]))
-    told = logs.plain(lab)
-    told.tau = np.stack([np.interp(lab.t - late, lab.t, x) for x in told.tau])
-    log = logs.finished(lab, told)
-    found = estimate_delay(log, BaseParameters.of(told.tree, tree_basis(told.tree)).basis)
+    lab = logs.Lab("puma560", seed)
+    found = estimate_delay(lab.log(0.3, logs.Fault("delay", late)), lab.basis)
     assert abs(found.delay + late) < 6e-5
     assert abs(found.delay + late) < 3 * found.doubt
 
