@@ -18,6 +18,8 @@ from idbench.sim.settings import Number, Whole, settings
 
 MOST_VALUES = 10000  # Values of an axis above which it is taken for a slip
 
+SERVO = "servo"  # Name of the model of servos in results
+
 FRICTION = "friction laws"
 """Field of the axis of the laws of friction that are identified; `friction` is that of the simulated robot."""
 

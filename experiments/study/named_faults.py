@@ -7,13 +7,10 @@ from idbench.experiments.identification.logs import Logs
 from idbench.experiments.identification.method import Method
 from idbench.experiments.identification.request import Request
 from idbench.experiments.identification.robot_model import RobotModel
+from idbench.experiments.study.statistics import NAMED
 from idbench.identify import IdentificationError, MotionLog
 from idbench.identify.judge.suspect import Suspect
 from idbench.sim.scenario.faults import FAULTS, OF_PAIRS, Fault
-
-NAMED = ("named", "misnamed")
-"""Columns of a study that asks for causes: whether the first cause of a run, or a rival named with it, is its fault, and
-whether another cause is named. `something else` is neither."""
 
 SAME = {"gravity": {"gravity", "tilt"}}
 """Causes that are right beside that of a fault: a base that is tilted a little has another gravity."""

@@ -19,8 +19,6 @@ from idbench.sim.robot.servos import links
 from idbench.sim.scenario.scenario import Scenario
 from idbench.sim.settings import per_joint
 
-SERVO = "servo"  # Name of the model in results
-
 
 def law_of(text: str) -> tuple[str, tuple[str, ...]]:
     """Return a law of friction, and what else is found, as `load+lead` states it."""

@@ -10,9 +10,7 @@ import numpy as np
 
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.identification.simulators import RobotPlant, ScenarioLoop
-from idbench.experiments.study.axis import Combination
-from idbench.experiments.study.named_faults import named_faults
-from idbench.experiments.study.servo_rows import SERVO, rows_of
+from idbench.experiments.study.axis import SERVO, Combination
 from idbench.experiments.study.statistics import BOUNDS
 from idbench.experiments.study.study import Study
 from idbench.identify import (
@@ -100,6 +98,8 @@ def run_shard(study: Study, runs: range, *, progress: Progress | None = None) ->
         for k, combination in enumerate(study.methods):
             start = time.perf_counter()
             if study.of_servos:
+                from idbench.experiments.study.servo_rows import rows_of
+
                 common = [
                     _common(study, combination, run, SERVO, seed) for run, seed in zip(together, simulated.seeds, strict=True)
                 ]
@@ -184,6 +184,8 @@ def _causes(study: Study, combination: Combination, simulated: Run, i: int) -> d
     """What the doctor says of a run, where the study asks for it."""
     if not study.causes or i in simulated.failures:
         return {}
+    from idbench.experiments.study.named_faults import named_faults
+
     robot_model, log = study.subjects[combination.friction], simulated.log.run((i,))
     return named_faults(combination.method, robot_model, log, simulated.scenario.faults)
 

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import scipy
 
-from idbench.experiments.study.named_faults import NAMED
 from idbench.experiments.text import SIGMAS
 from idbench.identify import Array
 
@@ -21,6 +20,10 @@ MIN_ERROR = 1e-16  # Relative error that counts as none: logarithms of 0 would s
 BOUNDS = (".bound", ".bound_through_reversals")
 """Of every parameter, in studies that ask for it: the least error that noise allows where friction near rest is not known, and
 where it is what its law says up to the instant of a reversal."""
+
+NAMED = ("named", "misnamed")
+"""Of every run, in studies that ask for causes: whether the first cause, or a rival named with it, is a fault of the run, and
+whether another cause is named. `something else` is neither."""
 
 NUMBER = re.compile(r"\d[\d.,e+-]*")
 

@@ -18,8 +18,8 @@ import tomli_w
 from idbench.experiments.errors import ResultsError, StudyError
 from idbench.experiments.results.writing import replace_own
 from idbench.experiments.study.cluster import require_versions, versions
-from idbench.experiments.study.named_faults import NAMED
 from idbench.experiments.study.shard import Shard, parts_of
+from idbench.experiments.study.statistics import NAMED
 from idbench.experiments.study.study import Study
 from idbench.experiments.study.study_file import study_from
 from idbench.sim.settings import read_toml

@@ -16,6 +16,7 @@ from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.requests.shared import CHAIN, ESTIMATOR, Parameters
 from idbench.experiments.study.axis import (
     FRICTION,
+    SERVO,
     Axis,
     Combination,
     Setting,
@@ -24,8 +25,7 @@ from idbench.experiments.study.axis import (
     servo_methods,
     whole_first,
 )
-from idbench.experiments.study.named_faults import NAMED
-from idbench.experiments.study.servo_rows import SERVO, names_of
+from idbench.experiments.study.statistics import NAMED
 from idbench.identify import MODELS, AbstractModel
 from idbench.identify.models import THREE, rows_per_sample
 from idbench.sim.drives import ServoDrive
@@ -251,6 +251,8 @@ class Study:
     def parameters(self) -> tuple[str, ...]:
         """Names of the parameters that are identified, with any of the laws of friction."""
         if self.of_servos:
+            from idbench.experiments.study.servo_rows import names_of  # half a second that other studies do not need
+
             return names_of(self._first, self.friction)
         return tuple(dict.fromkeys(name for robot_model in self.subjects.values() for name in robot_model.basis.names))
 

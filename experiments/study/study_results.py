@@ -36,9 +36,8 @@ from idbench.experiments.study.figures import (
     named_figure,
     typical_figure,
 )
-from idbench.experiments.study.named_faults import NAMED
 from idbench.experiments.study.ratios import compares_models, interval, pair_of, ratios, ratios_table, study_answer
-from idbench.experiments.study.statistics import BOUNDS, Cell, cells
+from idbench.experiments.study.statistics import BOUNDS, NAMED, Cell, cells
 from idbench.experiments.study.store import Store, arrays
 from idbench.experiments.study.study import Study
 from idbench.experiments.study.worst_runs import command, worst_runs

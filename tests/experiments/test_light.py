@@ -34,6 +34,15 @@ def test_the_list_of_plugins_loads_neither_scipys_parts_nor_figures(start):
     assert not loaded & {"scipy.signal", "scipy.stats", "scipy.optimize", "matplotlib", "rerun", "pyarrow"}
 
 
+def test_a_table_loads_scipys_filters_and_no_figures(start, tmp_path):
+    """Chain paper has Butterworth's filters, and nothing else needs SciPy's distributions or servos."""
+    code = "import sys; from idbench.experiments.cli import main\nmain(['table1', '--no-rerun'])\nprint('loaded', *sys.modules)"
+    out, err = start("-c", code, cwd=tmp_path).communicate()
+    loaded = set(out.splitlines()[-1].split())
+    assert "scipy.signal" in loaded, err
+    assert not loaded & {"matplotlib", "numba", "idbench.identify.servo"}
+
+
 @pytest.mark.parametrize(
     ("words", "most"),
     [

@@ -13,7 +13,6 @@ from idbench.experiments.cli.options.jobs import SearchCommand, Table1Command, T
 from idbench.experiments.cli.saving import saved
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.paper.job import Searching, searched, table1_of
-from idbench.experiments.paper.motions import Table1Motions, picture, print_motions
 from idbench.experiments.paper.table1 import print_table1
 from idbench.experiments.paper.table2 import Table2, print_table2
 from idbench.experiments.results.folder import ResultsFolder
@@ -51,6 +50,8 @@ def compare(options: Table1Command) -> None:
 
 def _over_motions(options: Table1Command, motions: int) -> None:
     """Lay the distribution of errors over random motions beside the paper's."""
+    from idbench.experiments.paper.motions import Table1Motions, picture, print_motions  # with figures, which tables lack
+
     if options.scenario is not None or options.chain != "all":
         raise ExperimentError(
             "--motions draws motions of its own and compares the paper's chains: leave --scenario and --chain out"

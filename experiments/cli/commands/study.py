@@ -17,7 +17,6 @@ from idbench.experiments.study.run_study import run_missing
 from idbench.experiments.study.statistics import cells
 from idbench.experiments.study.store import Store, arrays
 from idbench.experiments.study.study_file import load_study, names
-from idbench.experiments.study.study_results import write_results
 
 if TYPE_CHECKING:
     from idbench.experiments.recording.study_recording import StudyRecording
@@ -46,6 +45,8 @@ def study(options: StudyCommand) -> None:
         if pool is not None:
             with runs_of(store.study.name, sum(len(r) for r in store.missing(runs))) as watch:
                 run_missing(store, pool, runs, watch, receive)
+        from idbench.experiments.study.study_results import write_results  # with figures: runs need none
+
         write_results(page, store, folder, recording)
 
 
