@@ -73,11 +73,9 @@ class MistakeRows:
 
     def every(self) -> list[Candidate]:
         """Return the mistakes of joints and of the robot, and those that are looked for from an instant on."""
-        joints, robot = range(self.basis.n), (None,)
-        asked = [(m, j) for m in OF_JOINTS if m is not GAIN for j in (self._hinges if m is ECCENTRIC else joints)] + [
-            (m, j) for m in (*OF_ROBOT, *FROM_AN_INSTANT) for j in robot
-        ]
-        found = [*self._gains(), *self._made(asked)]
+        joints, of_joints = range(self.basis.n), [m for m in OF_JOINTS if m is not GAIN]
+        asked = [(m, j) for m in of_joints for j in (self._hinges if m is ECCENTRIC else joints)]
+        found = [*self._gains(), *self._made([*asked, *((m, None) for m in (*OF_ROBOT, *FROM_AN_INSTANT))])]
         slips = [replace(c, mistake=c.mistake._replace(cause="slip")) for c in found if c.mistake.cause == "zero"]
         held = [c for c in found if c.mistake in FROM_AN_INSTANT]
         steady = [c for c in found if c.mistake not in FROM_AN_INSTANT]
@@ -120,8 +118,7 @@ class MistakeRows:
             return
         line = 2 * np.pi * f[some][power[some].argmax()] * self._time
         for c in self._made([(m, None) for m in BASE]):
-            plain = c.plain * np.stack([np.sin(line), np.cos(line)], axis=-1)
-            yield self._candidate(c.mistake, None, plain)
+            yield self._candidate(c.mistake, None, c.plain * np.stack([np.sin(line), np.cos(line)], axis=-1))
 
     def rippled(self, e: Array) -> Iterator[Candidate]:
         """Yield ripples of hinges, of the waves that residuals e, shape (r,), have most of."""

@@ -182,7 +182,7 @@ class TorqueGains:
         for _ in range(ROUNDS):
             weight = self._weights(X, a)
             X = self._least_squares(a, weight)
-            dX, da = self._step(X, a, weight)
+            dX, da = np.split(np.linalg.lstsq(*self._linear(X, a, weight))[0], [len(X)])
             share, after = 1.0, np.inf
             while share > SETTLED and not (after := self._misfit(X + share * dX, a + share * da)) <= misfit:
                 share /= 2
@@ -190,12 +190,6 @@ class TorqueGains:
                 break
             X, a, misfit = X + share * dX, np.where(self.free, a + share * da, a), after
         return X, a
-
-    def _step(self, X: Array, a: Array, weight: Array) -> tuple[Array, Array]:
-        A, y = self._linear(X, a, weight)
-        step = np.asarray(np.linalg.lstsq(A, y)[0])
-        p = len(X)
-        return step[:p], step[p:]
 
     def _linear(self, X: Array, a: Array, weight: Array) -> tuple[Array, Array]:
         """Rows of the step [dX, da], each joint's times its weight: its residual, and the slopes of what is predicted."""
