@@ -6,17 +6,8 @@ from itertools import chain
 from typing import Any
 
 from idbench.experiments.errors import ExperimentError
-from idbench.identify import (
-    BLOCKS,
-    AbstractBlock,
-    AbstractJointLaw,
-    Array,
-    KinematicTree,
-    OfJoints,
-    SettingError,
-    UnknownNameError,
-)
-from idbench.identify.basis import Balancer
+from idbench.identify import BLOCKS, AbstractBlock, AbstractJointLaw, Array, KinematicTree, SettingError, UnknownNameError
+from idbench.identify.basis import Balancer, OfJoints
 from idbench.identify.plugins import did_you_mean
 
 AUTO = "auto"  # The laws are those that predict motion best that was not fitted

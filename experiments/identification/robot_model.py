@@ -121,10 +121,8 @@ class RobotModel:
     @cached_property
     def rotors_assumed(self) -> bool:
         """Whether all joints have rotors because the robot's file cannot say which do."""
-        suffix = Path(self.name).suffix.lower()
-        return (
-            self.asked.armature == "auto" and suffix in FILES and suffix != ".xml" and not self.robot.model.dof_armature.any()
-        )
+        silent = Path(self.name).suffix.lower() in FILES and Path(self.name).suffix.lower() != ".xml"
+        return self.asked.armature == "auto" and silent and not self.robot.model.dof_armature.any()
 
     @cached_property
     def grouping(self) -> BaseParameters:
