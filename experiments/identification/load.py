@@ -239,8 +239,7 @@ def judged_on(loaded: Loaded, every: Mapping[str, ReadLog], truth: Mapping[str, 
 
 def require_different(paths: Sequence[Path]) -> None:
     """Raise ExperimentError if a log is given twice."""
-    twice = [str(path) for k, path in enumerate(paths) if path.absolute() in [p.absolute() for p in paths[:k]]]
-    if twice:
+    if twice := [str(path) for k, path in enumerate(paths) if path.absolute() in [p.absolute() for p in paths[:k]]]:
         raise ExperimentError(f"{', '.join(twice)} is given twice: it would count twice")
 
 

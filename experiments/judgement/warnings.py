@@ -141,8 +141,7 @@ def _badly_explained(fit: Fit, name: str) -> Iterator[str]:
         return
     sizes = {j: f"{100 * share:.0f} %" if share > 0 else "nothing" for j, share in poor.items()}
     poorly = ", ".join(f"{size} of tau{j + 1}" for j, size in sizes.items())
-    others = [o for o, shares in fit.explained.items() if all(shares[j] >= WELL_EXPLAINED for j in poor)]
-    if others:
+    if others := [o for o, shares in fit.explained.items() if all(shares[j] >= WELL_EXPLAINED for j in poor)]:
         yield (
             f"the {name} model explains {poorly}, where the {others[0]} model explains at least {100 * WELL_EXPLAINED:.0f} %: "
             f"noise of the velocities, or too little motion of {', '.join(joints[j] for j in poor)}; take the {others[0]} model"

@@ -104,8 +104,8 @@ class Pairs:
 
     def robot(self, run: int, known: Mapping[str, float], gains: Array | float = 1.0) -> LoadedRobot:
         """Return the robot with the logs of a run, currents as if its drives had these gains."""
-        logs = [replace(each.alone(run), tau=each.alone(run).tau / gains) for each in self.simulated]
-        first, second = ((log,) for log in logs)
+        logs = (each.alone(run) for each in self.simulated)
+        first, second = ((replace(log, tau=log.tau / gains),) for log in logs)
         return LoadedRobot(self.robot_model.tree, self.robot_model.grouping.standard, first, second, known=known)
 
     def payloads(self, told: Progress) -> dict[str, PairScore]:

@@ -133,11 +133,8 @@ def showing_moves(tree: KinematicTree, grouping: BaseParameters, names: Sequence
 
     every = tuple(range(tree.n))
     moves = [move for count in range(1, min(MOST_JOINTS, tree.n) + 1) for move in combinations(every, count)]
-    whole, found = shown(every), dict[str, tuple[int, ...]]()
-    for name in names:
-        i = basis.names.index(name)
-        found[name] = next((joints for joints in moves if shown(joints)[i] >= ENOUGH * whole[i]), every)
-    return found
+    whole, places = shown(every), {name: basis.names.index(name) for name in names}
+    return {name: next((move for move in moves if shown(move)[i] >= ENOUGH * whole[i]), every) for name, i in places.items()}
 
 
 def brisk_shares(tree: KinematicTree, basis: Basis, X: Array, sigma: Array) -> Array:

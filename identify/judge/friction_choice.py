@@ -179,8 +179,7 @@ class _Choice:
         if not isinstance(self.problem.chain.mask, NoMask):
             return ()
         letters = {self._replaced(name) for name in laws[j]}
-        names = [name for x in letters for name in self._letters(j, x)]
-        if not names:
+        if not (names := [name for x in letters for name in self._letters(j, x)]):
             return ()
         with_it, without = (self._search(laws, {}, gone).errors[j] for gone in ([], names))
         return tuple(letters) if (1 - WORTH) * without < with_it else ()

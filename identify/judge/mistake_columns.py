@@ -126,8 +126,7 @@ def link_length(m: FittedMotion, j: int, axis: int) -> Rows:
     """Return columns of an origin that is farther along an axis."""
 
     def longer(tree: KinematicTree) -> KinematicTree:
-        joint = tree.joints[j]
-        moved = replace(joint, position=joint.position + SMALL * np.eye(3)[axis])
+        moved = replace(tree.joints[j], position=tree.joints[j].position + SMALL * np.eye(3)[axis])
         return replace(tree, joints=(*tree.joints[:j], moved, *tree.joints[j + 1 :]))
 
     return whole_rows(m.on(longer)) if j else {}

@@ -127,6 +127,5 @@ def something_else(shares: Sequence[MotionShare]) -> Iterator[Suspect]:
     most, j = max(every, default=(0.0, 0))
     if most > WORTH_A_WORD:
         one, pair = shares[j], tuple(100 * x / max(shares[j].level, TINY) for x in (shares[j].rms, shares[j].noise))
-        cause = one.variable or "moment"
-        size = one.rms * one.share**0.5
+        cause, size = one.variable or "moment", one.rms * one.share**0.5
         yield Suspect("unknown", cause, j, (size,), (0.0,), "N m", 0.0, np.inf, (), (pair[0], pair[1]), 0.0)

@@ -135,8 +135,7 @@ def binned(x: Array, y: Array, weight: Array, edges: Array) -> Array:
     edges : Array, shape (bins + 1,)
         Ends of the bins.
     """
-    total, _ = np.histogram(x, edges, weights=weight)
-    summed, _ = np.histogram(x, edges, weights=weight * y)
+    total, summed = (np.histogram(x, edges, weights=each)[0] for each in (weight, weight * y))
     return np.divide(summed, total, out=np.full(len(total), np.nan), where=total > 0)
 
 

@@ -196,11 +196,9 @@ class _Joint:
         mean = float(share @ y) / self.rows
         spread = float(np.sum((y - mean * share) ** 2))
         R2 = 1 - float(rho @ rho) / spread if spread > 0 else np.nan
-        return self._rms(rho), self._rms(y) or self._balanced(), R2, self._correlation(), len(rho)
-
-    def _balanced(self) -> float:
-        """Return the rms of the terms of the model, W_i X_i, as if they were independent of each other."""
-        return sqrt(float(np.sum((self.W[self.valid] * self.X) ** 2)) / self.rows)
+        # Of a joint whose torque is 0: that of the terms of the model, W_i X_i, as if they were independent of each other.
+        level = self._rms(y) or self._rms(self.W[self.valid] * self.X)
+        return self._rms(rho), level, R2, self._correlation(), len(rho)
 
     @property
     def rows(self) -> float:

@@ -271,8 +271,8 @@ def _in_degrees(problem: Problem) -> Iterator[_Tried]:
     if not driven.all():
         return
     yield _Tried("unit", "position", None, (DEGREE,), _changed(problem, q=np.diag(np.where(hinges, DEGREE, 1.0))))
-    for j in np.flatnonzero(hinges) if n > 1 else ():
-        yield _Tried("unit", "joint", int(j), (DEGREE,), _changed(problem, q=_diagonal(n, j, DEGREE)))
+    for j in map(int, np.flatnonzero(hinges)) if n > 1 else ():
+        yield _Tried("unit", "joint", j, (DEGREE,), _changed(problem, q=_diagonal(n, j, DEGREE)))
 
 
 def _turned(problem: Problem) -> Iterator[_Tried]:
