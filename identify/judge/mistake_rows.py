@@ -77,7 +77,7 @@ class MistakeRows:
 
     def _gains(self) -> Iterator[Candidate]:
         """Yield torques that are too large beside others, from rows of what is predicted: parameters leave little of them."""
-        held = np.concatenate([held_torque(part) for part in self.parts])
+        held = held_torque(self.parts)
         predicted = np.concatenate([part.rows.predicted(self.X) for part in self.parts]) + held
         measured = np.concatenate([part.rows.Y for part in self.parts]) + held
         group = np.concatenate([part.rows.group for part in self.parts])

@@ -56,7 +56,7 @@ def motion_shares(problem: Problem, X: Array) -> list[MotionShare]:
         Its estimate.
     """
     rows, stretches = problem.rows, Stretches.of(problem.parts)
-    measured = rows.by_kind(rows.Y + np.concatenate([held_torque(part) for part in problem.parts]))
+    measured = rows.by_kind(rows.Y + held_torque(problem.parts))
     e = rows.by_kind((rows.Y - rows.predicted(X)) * rows.valid)
     place = np.concatenate([stretches.at(k, part.rows.time) for k, part in enumerate(problem.parts)])
     place = place.reshape(-1, rows.kinds)[:, 0]

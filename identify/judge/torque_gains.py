@@ -48,7 +48,7 @@ class TorqueGains:
     @classmethod
     def of(cls, problem: Problem) -> Self:
         """Gains of all torques that change, beside the explicit model of a problem whose rows are kept."""
-        rows, held = problem.rows, np.concatenate([held_torque(part) for part in problem.parts])
+        rows, held = problem.rows, held_torque(problem.parts)
         whole = np.column_stack([rows.W, held, rows.Y + held]) * rows.valid[:, None]
         p, n = whole.shape[1], problem.basis.n
         factors = np.zeros((n, p, p))
@@ -151,7 +151,7 @@ class TorqueGains:
 
     def _spread(self, X: Array, a: Array) -> Array:
         """How many times that of white ones the variance of sums of the residuals is, shape (joint,)."""
-        rows, held = self.problem.rows, np.concatenate([held_torque(part) for part in self.problem.parts])
+        rows, held = self.problem.rows, held_torque(self.problem.parts)
         rest = rows.Y + held - a[rows.group] * (rows.predicted(X) + held)
         to_rows = rows.maps[0]
         return variance_of_sums(rows.by_kind(rest * rows.valid), to_rows.grid.step / to_rows.signals.fs)
