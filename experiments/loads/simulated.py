@@ -127,7 +127,7 @@ class Pairs:
     def _payload(self, identify: Callable[[LoadedRobot], PayloadEstimate], run: int) -> Found:
         """Return names, estimate, sigma and truth of the payload's base parameters in a run."""
         robot = self.robot(run, {})
-        found, base = identify(robot), np.array(list(robot.of_payload.values())) @ np.array([self.truth[x] for x in LETTERS])
+        found, base = identify(robot), np.array(list(robot.payload.values())) @ np.array([self.truth[x] for x in LETTERS])
         return found.names, found.X, found.sigma, base
 
     def _scored(self, one: Callable[[int], Found], told: Progress, number: int = 0, count: int = 1) -> PairScore:

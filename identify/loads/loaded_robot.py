@@ -62,7 +62,7 @@ class LoadedRobot:
         return BaseParameters.of(self.tree, self.standard + PayloadLink(self.tree, self.tree.n - 1))
 
     @cached_property
-    def of_payload(self) -> dict[str, Array]:
+    def payload(self) -> dict[str, Array]:
         """Base parameters of the payload by name: what its ten standard parameters make of each, shape (10,)."""
         both, p = self.both, len(self.standard.names)
         return {name: K[p:] for name, k, K in zip(both.names, both.kept, both.K, strict=True) if k >= p}
@@ -70,7 +70,7 @@ class LoadedRobot:
     @cached_property
     def names(self) -> tuple[str, ...]:
         """Names of the payload's base parameters that are not known."""
-        return tuple(name for name in self.of_payload if name not in self.known)
+        return tuple(name for name in self.payload if name not in self.known)
 
     @cached_property
     def basis(self) -> Basis:

@@ -153,9 +153,9 @@ WAYS: Mapping[str, Callable[[LoadedRobot], PayloadEstimate]] = {f.__name__: f fo
 
 def _as_link(robot: LoadedRobot) -> tuple[Array, Array]:
     """Return T, which makes of the payload's free parameters what they add to the robot's, and what known ones add."""
-    own, names = [robot.standard.names.index(f"{letters}{robot.tree.n}") for letters in INERTIAL], list(robot.of_payload)
+    own, names = [robot.standard.names.index(f"{letters}{robot.tree.n}") for letters in INERTIAL], list(robot.payload)
     # What ten parameters of the link add, by those of the payload.
-    T = robot.robot.K[:, own] @ np.linalg.pinv(np.array(list(robot.of_payload.values())))
+    T = robot.robot.K[:, own] @ np.linalg.pinv(np.array(list(robot.payload.values())))
     free = [names.index(name) for name in robot.names]
     return T[:, free], T @ np.array([robot.known.get(name, 0.0) for name in names])
 
