@@ -115,12 +115,8 @@ class Cause:
     def advice(self) -> str:
         """What is wrong, what mends it, and what that gains on stretches of the log that were not fitted."""
         before, after = (error_percentage(x) for x in self.suspect.held_out)
-        gain = (
-            ""
-            if not any(self.suspect.held_out)
-            else f"; once mended, the error on held-out stretches falls from {before} to {after}"
-        )
-        return f"{self.words}{gain}; {'try ' if self.remedy else ''}{self.mends}"
+        fall = f"; once mended, the error on held-out stretches falls from {before} to {after}"
+        return f"{self.words}{fall if any(self.suspect.held_out) else ''}; {'try ' if self.remedy else ''}{self.mends}"
 
     def summary(self) -> dict[str, Any]:
         """Its part of summary.json."""
@@ -182,9 +178,7 @@ class Cause:
             return f"the torque has the other sign and is {-factor:.4g} times too large"
         if 1 / LARGE < factor < LARGE:
             return f"torque constant {size} too {'large' if factor > 1 else 'small'}"
-        unit = (
-            ", as in mN m" if abs(np.log10(factor) - 3) < ABOUT else ", as in kN m" if abs(np.log10(factor) + 3) < ABOUT else ""
-        )
+        unit = next((f", as in {x}" for x, k in (("mN m", 3), ("kN m", -3)) if abs(np.log10(factor) - k) < ABOUT), "")
         return f"torque {factor:.4g} times too large{unit}"
 
     @property
@@ -248,8 +242,4 @@ def words_of_diagnosis(causes: Sequence[Cause] | None) -> str:
     """Result of the tests, in a line."""
     if causes is None:
         return "mistakes: not tested, the rows are too few or are not kept"
-    return (
-        f"mistakes: {'; '.join(cause.words for cause in causes)}"
-        if causes
-        else "mistakes: none of those that were tested shows"
-    )
+    return f"mistakes: {'; '.join(cause.words for cause in causes) or 'none of those that were tested shows'}"

@@ -7,17 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from idbench.experiments.errors import ExperimentError
-from idbench.identify import (
-    ALIGNMENTS,
-    CHAINS,
-    DIFFERENTIATORS,
-    MASKS,
-    OPERATORS,
-    PREFILTERS,
-    Chain,
-    IdentificationError,
-    SettingError,
-)
+from idbench.identify import ALIGNMENTS, CHAINS, DIFFERENTIATORS, MASKS, OPERATORS, PREFILTERS, Chain
 from idbench.identify.plugins import Table, did_you_mean
 from idbench.identify.signals.prefilters import ButterworthPrefilter
 
@@ -52,7 +42,7 @@ def replaced(part: Any, path: list[str], value: Any) -> Any:
         value = _stage(path[0], value)
     try:
         return replace(part, **{path[0]: value})
-    except (SettingError, TypeError, ValueError) as error:
+    except (TypeError, ValueError) as error:  # such as a SettingError
         raise ExperimentError(str(error)) from error
 
 
@@ -90,7 +80,7 @@ def chain_of(file: Path) -> tuple[str, Chain]:
                 raise ExperimentError(f"{'.'.join(path)} = {value!r:.60}: {error}") from error
     except OSError as error:
         raise ExperimentError(f"--chain-file {file}: {error.strerror or error}") from error
-    except (ValueError, RecursionError, ExperimentError, IdentificationError) as error:
+    except (ValueError, RecursionError, ExperimentError) as error:
         raise ExperimentError(f"--chain-file {file}: {error}") from error
     return name, chain
 

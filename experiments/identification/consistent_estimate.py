@@ -41,9 +41,8 @@ def drawn_about(robot_model: RobotModel, estimate: Estimate, deviations: Array) 
     for k, own in enumerate(found):
         if not exist(grouping.standard.parameters, own):
             with stage(f"robot {k + 1} of {len(found)}"):
-                found[k] = consistent_of(
-                    robot_model, replace(estimate, X=estimate.X + deviations[k]), HELD_NEAR, middle
-                ).standard
+                off = replace(estimate, X=estimate.X + deviations[k])
+                found[k] = consistent_of(robot_model, off, HELD_NEAR, middle).standard
     return found
 
 

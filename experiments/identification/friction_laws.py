@@ -6,17 +6,8 @@ from itertools import chain
 from typing import Any
 
 from idbench.experiments.errors import ExperimentError
-from idbench.identify import (
-    BLOCKS,
-    AbstractBlock,
-    AbstractJointLaw,
-    Array,
-    KinematicTree,
-    OfJoints,
-    SettingError,
-    UnknownNameError,
-)
-from idbench.identify.basis import Balancer
+from idbench.identify import BLOCKS, AbstractBlock, AbstractJointLaw, Array, KinematicTree, SettingError, UnknownNameError
+from idbench.identify.basis import Balancer, OfJoints
 from idbench.identify.plugins import did_you_mean
 
 AUTO = "auto"  # The laws are those that predict motion best that was not fitted
@@ -133,10 +124,15 @@ def _laws(text: str, laws: str) -> tuple[str, ...]:
         try:
             law_of(name)
         except UnknownNameError:
-            known = [*GROUPS, AUTO, *(known for known in BLOCKS if isinstance(BLOCKS.create(known), AbstractJointLaw))]
+            known = [*GROUPS, AUTO, *joint_laws()]
             hint = did_you_mean(name.partition(":")[0], known)
             raise ExperimentError(f"--friction {text}: no law {name!r}{hint}; known: {', '.join(known)}") from None
     return found
+
+
+def joint_laws() -> list[str]:
+    """Names of the laws of a joint's friction."""
+    return [name for name in BLOCKS if isinstance(BLOCKS.create(name), AbstractJointLaw)]
 
 
 def law_of(name: str, option: str = "--friction") -> AbstractBlock:

@@ -50,14 +50,14 @@ def _far_from_least_squares(fit: Fit, model: str, estimate: Estimate) -> Iterato
 
 def iterations(fit: Fit) -> dict[str, Any]:
     """Its part of summary.json."""
-    every = {model: e for model, e in fit.estimates.items() if e.path}
     return {
         model: {
             "simulations": None if e.simulations is None else int(e.simulations),
             "path": [[finite(x) for x in X] for X in e.path],
             **({"noise_in_W": _test(e)} if isinstance(fit.request.method.estimator, InstrumentalVariables) else {}),
         }
-        for model, e in every.items()
+        for model, e in fit.estimates.items()
+        if e.path
     }
 
 

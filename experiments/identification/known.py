@@ -144,8 +144,7 @@ class RoughlyKnown:
         """
         K = grouping.K[[grouping.basis.places[parameter] for parameter in basis.parameters]]
         standard = grouping.standard.parameters
-        parts, known = list[Prior](), np.full(len(standard), inf)
-        stated = filed.copy()
+        parts, known, stated = list[Prior](), np.full(len(standard), inf), filed.copy()
         for name, trust in self.values.items():
             if name in basis.names and name not in grouping.standard.names:
                 place = basis.names.index(name)
@@ -162,15 +161,13 @@ class RoughlyKnown:
                 _require_sigma(standard[i].name, known[i])
         if np.isfinite(known).any():
             used = (K[:, np.isfinite(known)] != 0).any(axis=1) & ~(K[:, ~np.isfinite(known)] != 0).any(axis=1)
-            idle = [standard[i].name for i in np.flatnonzero(np.isfinite(known)) if not (K[used, i] != 0).any()]
-            if idle:
+            if idle := [standard[i].name for i in np.flatnonzero(np.isfinite(known)) if not (K[used, i] != 0).any()]:
                 raise ExperimentError(
                     f"--prior: {_grouped(grouping, idle)}: say of all parts, hold them (--hold), or leave it out"
                 )
             parts.append(normal_prior(K, stated, known))
         if self.links:
-            given = {p.name for p in (*grouping.standard.held, *grouping.standard.tied) if p.kind in BODY}
-            if given:
+            if given := {p.name for p in (*grouping.standard.held, *grouping.standard.tied) if p.kind in BODY}:
                 raise ExperimentError(
                     f"--prior file: {', '.join(sorted(given))} is held or tied, but links are near the file's as a whole: "
                     "leave one out"

@@ -46,10 +46,9 @@ class SimulatedLogs:
     @classmethod
     def of(cls, every: Sequence[ReadLog], request: Request) -> "SimulatedLogs | None":
         """Reading of a simulation's torques, if stated or evident; None otherwise."""
-        robot_model, stated = request.robot_model, any(read.simulated for read in every)
-        inertia = apparent_rotor_inertia(robot_model.robot)
+        robot_model, inertia = request.robot_model, apparent_rotor_inertia(request.robot_model.robot)
         found = cls(robot_model, inertia)
-        if stated:
+        if any(read.simulated for read in every):
             if Path(robot_model.name).suffix not in ("", ".xml"):
                 raise ExperimentError(
                     f"--simulated: the integrator, its step and kv are those of an MJCF file, which {robot_model.name} is not: "
@@ -73,15 +72,11 @@ class SimulatedLogs:
             motion.append(s.derivative(motion[-1], log.fs))
         extra = torque_of_steps(self.robot_model.robot, [x.T for x in motion])
         extra = shift(np.ascontiguousarray(extra.T), log.torque.delay * log.fs).T
-        tau, edge = (
-            log.tau - extra / np.asarray(log.torque.gain),
-            ceil((DERIVATIVES * s.halo(log.fs) + abs(log.torque.delay)) * log.fs) + REACH,
-        )
+        edge = ceil((DERIVATIVES * s.halo(log.fs) + abs(log.torque.delay)) * log.fs) + REACH
         instantaneous = log.torque.delay == 0 and not log.torque.lags
-        late = acting_late(self.robot_model.robot)
-        torque = replace(log.torque, delay=log.torque.delay + late)
+        torque = replace(log.torque, delay=log.torque.delay + acting_late(self.robot_model.robot))
         torque = replace(torque, meaning="instantaneous", period=None) if instantaneous else torque
-        return replace(log, tau=tau, torque=torque).part(edge, log.samples - edge)
+        return replace(log, tau=log.tau - extra / np.asarray(log.torque.gain), torque=torque).part(edge, log.samples - edge)
 
     def _evident(self, logs: Sequence[MotionLog], request: Request) -> bool:
         """True if the file's parameters explain the torques so much better."""
@@ -177,8 +172,7 @@ def prepared(
 ) -> Loaded:
     """Return logs of one fit that were read, with the band that suits them and, if it is sought, the delay of their torques."""
     _require_other_samples(every)
-    of_band, logs = list[str](), [log for one in every for log in one.logs]
-    simulated = None
+    of_band, logs, simulated = list[str](), [log for one in every for log in one.logs], None
     if any(log.poses for log in logs):
         request = of_poses(request, logs, band=band, sought=sought)
     if band and not logs[0].poses:
@@ -245,8 +239,7 @@ def judged_on(loaded: Loaded, every: Mapping[str, ReadLog], truth: Mapping[str, 
 
 def require_different(paths: Sequence[Path]) -> None:
     """Raise ExperimentError if a log is given twice."""
-    twice = [str(path) for k, path in enumerate(paths) if path.absolute() in [p.absolute() for p in paths[:k]]]
-    if twice:
+    if twice := [str(path) for k, path in enumerate(paths) if path.absolute() in [p.absolute() for p in paths[:k]]]:
         raise ExperimentError(f"{', '.join(twice)} is given twice: it would count twice")
 
 

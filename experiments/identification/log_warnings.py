@@ -84,8 +84,7 @@ def warnings_of_log(log: MotionLog, tree: KinematicTree) -> list[str]:
     by_reason = dict[str, list[str]]()
     for j, (joint, q) in enumerate(zip(tree.joints, log.q.reshape(-1, log.n).T, strict=True)):
         ends = np.array([q.min(), q.max()])
-        reason = "" if j in jumping else _reason(joint, ends)
-        if reason:
+        if j not in jumping and (reason := _reason(joint, ends)):
             by_reason.setdefault(reason, []).append(f"{joint.name} goes from {ends[0]:.4g} to {ends[1]:.4g}")
     return found + [
         Note(f"{', '.join(each)}{reason}", option=noted(reason).option) for reason, each in by_reason.items()

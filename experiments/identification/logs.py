@@ -44,9 +44,8 @@ class LogFacts:
     @cached_property
     def rows(self) -> list[dict[str, Any]]:
         """What each joint's columns are like."""
-        log, steps = self.log, encoder_steps(self.columns.q)
+        log, steps, speed = self.log, encoder_steps(self.columns.q), np.abs(self.velocities)
         noises = [white_noise(x) for x in (log.q, log.tau)]
-        speed = np.abs(self.velocities)
         return [
             {
                 "joint": joint,
@@ -71,8 +70,7 @@ class LogFacts:
             yield f"there is no torque of {', '.join(self.columns.names[j] for j in absent)}: a fit leaves its rows out"
         if dead:
             yield f"the torque of {', '.join(dead)} never changes: is it logged?"
-        still = [row["joint"] for row in self.rows if row["q"][0] == row["q"][1]]
-        if still:
+        if still := [row["joint"] for row in self.rows if row["q"][0] == row["q"][1]]:
             yield f"{', '.join(still)} never moves"
 
     def summary(self) -> dict[str, Any]:
@@ -142,19 +140,12 @@ class Logs:
                 found[meaning] = estimated([log for log in self.fitted if log.torque.meaning == meaning], basis, chain)
             except IdentificationError as error:
                 return replace(self, notes=(*notes, _with_laws(error))), False
-        said = ", ".join(each.words for each in found.values())
-        first = next(iter(found.values()))
-        fitted = [(log, found[log.torque.meaning]) for log in self.fitted]
-        moved = any(own.differs(log.torque, max(own.doubt, LEAST / log.fs)) for log, own in fitted)
-        delayed = replace(
-            self,
-            fitted=tuple(with_delay(log, own) for log, own in fitted),
-            held_out={
-                name: with_delay(log, found.get(log.torque.meaning, first)) for name, log in (self.held_out or {}).items()
-            },
-            notes=(*notes, _with_laws(said)),
-        )
-        return delayed, moved
+        said, first = ", ".join(each.words for each in found.values()), next(iter(found.values()))
+        each = [(log, found[log.torque.meaning]) for log in self.fitted]
+        moved = any(own.differs(log.torque, max(own.doubt, LEAST / log.fs)) for log, own in each)
+        fitted, others = tuple(with_delay(log, own) for log, own in each), (self.held_out or {}).items()
+        held_out = {name: with_delay(log, found.get(log.torque.meaning, first)) for name, log in others}
+        return replace(self, fitted=fitted, held_out=held_out, notes=(*notes, _with_laws(said))), moved
 
     def without_torque(self, joint: int) -> "Logs":
         """Return the logs without the torque of a joint, from 0, where it never changes; all, if it changes in all."""

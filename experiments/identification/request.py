@@ -12,15 +12,7 @@ from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.identification.simulators import RobotPlant, ScenarioLoop
 from idbench.experiments.identification.smooth_friction import places_of, prior_of, sizes_of
 from idbench.experiments.requests.words import Start
-from idbench.identify import (
-    MODELS,
-    Basis,
-    Chain,
-    ExplicitModel,
-    MotionLog,
-    Problem,
-    Simulation,
-)
+from idbench.identify import MODELS, Basis, Chain, ExplicitModel, MotionLog, Problem, Simulation
 from idbench.identify.blame import blamed
 from idbench.identify.estimators.settle import settled
 from idbench.identify.models import THREE
@@ -69,18 +61,16 @@ class Request:
         if self.wdyn is not None and not 0 < self.wdyn[0] < np.inf:
             raise ExperimentError(f"--wdyn {self.wdyn[0]:g} must be above 0 [Hz], and finite")
         self.robot_model.check()
-        method = self.method
         for name in self.models:
             MODELS.create(name)
-        n, given = self.robot_model.robot.n, " ".join(f"{x:g}" for x in self.mask_speed)
+        method, n, given = self.method, self.robot_model.robot.n, " ".join(f"{x:g}" for x in self.mask_speed)
         if self.mask_speed and not isinstance(self.processing.mask, ReversalMask):
             raise ExperimentError(
                 f"--mask-speed {given}: --chain {method.chain_name} with these options masks nothing; leave it out"
             )
         if len(self.mask_speed) not in (0, 1, n) or not all(0 < x < np.inf for x in self.mask_speed):
             raise ExperimentError(f"--mask-speed {given} must be one speed above 0 for all {n} joints, or one for each")
-        laws = self.robot_model.laws
-        rough = "--prior" if self.robot_model.asked.prior else "--friction smooth" if laws.smooth else ""
+        rough = "--prior" if self.robot_model.asked.prior else "--friction smooth" if self.robot_model.laws.smooth else ""
         if rough and not method.estimator.takes_prior:
             raise ExperimentError(
                 f"{rough}: {method.estimator_name} takes nothing that is known before; use --estimator GLS, WLS or OLS, "

@@ -9,20 +9,10 @@ from typing import Any, Self
 import numpy as np
 
 from idbench.experiments.errors import ExperimentError
-from idbench.experiments.identification.friction_laws import AUTO, SMOOTH, FrictionLaws, balancers, law_of
+from idbench.experiments.identification.friction_laws import AUTO, SMOOTH, FrictionLaws, balancers, joint_laws, law_of
 from idbench.experiments.identification.known import Known, RoughlyKnown
 from idbench.experiments.requests.shared import Parameters
-from idbench.identify import (
-    BLOCKS,
-    AbstractJointLaw,
-    Array,
-    BaseParameters,
-    Basis,
-    IdentificationError,
-    KinematicTree,
-    SettingError,
-    tree_basis,
-)
+from idbench.identify import Array, BaseParameters, Basis, IdentificationError, KinematicTree, SettingError, tree_basis
 from idbench.identify.basis.block import named
 from idbench.identify.parameters.base_parameters import in_letters_of_the_paper
 from idbench.identify.rows.factors import Prior
@@ -116,8 +106,7 @@ class RobotModel:
     @cached_property
     def held(self) -> dict[str, float]:
         """Standard parameters that are held, by name."""
-        basis = self.grouping.standard
-        return {parameter.name: float(np.asarray(value)) for parameter, value in basis.held.items()}
+        return {parameter.name: float(np.asarray(value)) for parameter, value in self.grouping.standard.held.items()}
 
     @cached_property
     def tree(self) -> KinematicTree:
@@ -213,8 +202,7 @@ class RobotModel:
         grouping = self.grouping
         base = np.zeros((len(X), len(grouping.names)))
         base[:, [grouping.basis.places[parameter] for parameter in self.basis.parameters]] = X
-        unknown = [name for name in grouping.standard.names if name not in self.given]
-        if unknown and exact:
+        if exact and (unknown := [name for name in grouping.standard.names if name not in self.given]):
             raise IdentificationError(
                 f"{', '.join(unknown)} cannot be simulated: robots of MuJoCo have viscous and Coulomb friction alone; use IV, "
                 "which does without them, an estimator that does not simulate, or leave these laws out"
@@ -261,11 +249,9 @@ class RobotModel:
 
     def _with_laws(self, basis: Basis) -> Basis:
         for name in self.asked.add:
-            block = law_of(name, "--add") if name in BLOCKS and isinstance(BLOCKS.create(name), AbstractJointLaw) else None
-            if block is None:
-                laws = [known for known in BLOCKS if isinstance(BLOCKS.create(known), AbstractJointLaw)]
+            if name not in (laws := joint_laws()):
                 raise ExperimentError(f"--add {name}: that is no law of a joint's friction; known: {', '.join(laws)}")
-            basis = basis + block
+            basis = basis + law_of(name, "--add")
         for balancer in balancers(self.asked.balancer, self.tree):
             basis = basis + balancer
         return basis

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -42,17 +43,8 @@ def contradicted(request: Request, problem: Problem, logs: tuple[MotionLog, ...]
 
 def _fewer(asked: Parameters) -> Iterator[tuple[str, Parameters]]:
     """Yield options that state parameters, word by word and then whole, with what is asked for without them."""
-    stated = {
-        "--hold": [(word, replace(asked, hold=_except(asked.hold, word))) for word in (*asked.hold, *_whole(asked.hold))],
-        "--tie": [(word, replace(asked, tie=_except(asked.tie, word))) for word in (*asked.tie, *_whole(asked.tie))],
-        "--prior": [(word, replace(asked, prior=_except(asked.prior, word))) for word in (*asked.prior, *_whole(asked.prior))],
-    }
-    yield from ((f"{option} {word}", without) for option, words in stated.items() for word, without in words)
-
-
-def _whole(words: tuple[str, ...]) -> tuple[str, ...]:
-    return (" ".join(words),) if len(words) > 1 else ()
-
-
-def _except(words: tuple[str, ...], word: str) -> tuple[str, ...]:
-    return tuple(each for each in words if each != word) if word in words else ()
+    for option, words in (("hold", asked.hold), ("tie", asked.tie), ("prior", asked.prior)):
+        fewer = {word: tuple(each for each in words if each != word) for word in words}
+        for word, left in (fewer | ({" ".join(words): ()} if len(words) > 1 else {})).items():
+            changed: dict[str, Any] = {option: left}
+            yield f"--{option} {word}", replace(asked, **changed)

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 FRICTION = "compare laws of friction: --friction auto"
 RESIDUAL = "look at its residual over the"
+ELSE = "something else, {size} rms,"
 
 
 class Wording(NamedTuple):
@@ -25,20 +26,16 @@ WORDINGS: Mapping[tuple[str, str], Wording] = {
     ("sign", "torque"): Wording("the torque has the other sign", "{gains}"),
     ("unit", "position"): Wording("positions are in degrees", "--units q=deg"),
     ("unit", "joint"): Wording("its position is in degrees", by="convert its column to the unit of the others"),
-    ("unknown", "velocity"): Wording("something else, {size} rms, over its velocity", by=FRICTION),
-    ("unknown", "load"): Wording("something else, {size} rms, over its load", by=FRICTION),
+    ("unknown", "velocity"): Wording(f"{ELSE} over its velocity", by=FRICTION),
+    ("unknown", "load"): Wording(f"{ELSE} over its load", by=FRICTION),
     ("unknown", "position"): Wording(
-        "something else, {size} rms, over its position", by=f"{RESIDUAL} position: a spring, a cable, a wave of its gear"
+        f"{ELSE} over its position", by=f"{RESIDUAL} position: a spring, a cable, a wave of its gear"
     ),
-    ("unknown", "acceleration"): Wording(
-        "something else, {size} rms, over its acceleration", by=f"{RESIDUAL} acceleration: a rotor, a delay"
-    ),
+    ("unknown", "acceleration"): Wording(f"{ELSE} over its acceleration", by=f"{RESIDUAL} acceleration: a rotor, a delay"),
     ("unknown", "other joints"): Wording(
-        "something else, {size} rms, over the motion of other joints", by="are torques mixed, as by a belt or a differential?"
+        f"{ELSE} over the motion of other joints", by="are torques mixed, as by a belt or a differential?"
     ),
-    ("unknown", "moment"): Wording(
-        "something else, {size} rms, for a moment of the log", by=f"{RESIDUAL} time, and cut that out"
-    ),
+    ("unknown", "moment"): Wording(f"{ELSE} for a moment of the log", by=f"{RESIDUAL} time, and cut that out"),
     ("stated", "request"): Wording("{stated} contradicts the log", by="leave {stated} out, or correct it"),
     ("sign", "joint"): Wording(
         "position and torque have the other sign: its axis points the other way",

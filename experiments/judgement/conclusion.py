@@ -42,10 +42,9 @@ def conclusion(judgement: Judgement, warnings: Mapping[str, Sequence[str]]) -> C
     word = verdict.word if verdict else ""
     causes = judgement.fit.diagnosis or ()
     proved = any(any(cause.suspect.held_out) for cause in causes)
-    doubts = map(noted, warnings.get(LOG, ()))
-    of_log = next(
-        (str(doubt) for doubt in doubts if doubt.about == JUMPS or (doubt.option and not proved and word != "good")), ""
-    )
+    certain = proved or word == "good"
+    doubts = (doubt for doubt in map(noted, warnings.get(LOG, ())) if doubt.about == JUMPS or (doubt.option and not certain))
+    of_log = str(next(doubts, ""))
     step = of_log or _next(judgement, warnings)
     if word == "poor" and judgement.fit.robot_model.assumed:
         step = f"{ASSUMED}: --robot FILE names another"

@@ -136,10 +136,8 @@ def on_last_quarter(result: Fit) -> "HeldOut":
     rest, end = split(logs.fitted[k])
     fitted = (*logs.fitted[:k], rest, *logs.fitted[k + 1 :])
     laws = "" if result.choice is None else ", with the laws of friction that all of it chose"
-    title = Note(
-        f"the last quarter of {logs.longest_name}, by a fit of the rest{laws}",
-        finding=f"the last quarter of {logs.longest_name}",
-    )
+    last = f"the last quarter of {logs.longest_name}"
+    title = Note(f"{last}, by a fit of the rest{laws}", finding=last)
     return HeldOut(fit(result.request, replace(logs, fitted=fitted)), manageable([end])[0], title, result.diagnosis or ())
 
 
@@ -198,10 +196,8 @@ class HeldOut:
     @cached_property
     def verdicts(self) -> dict[str, Verdict]:
         """What to think of each model."""
-        return {
-            model: Verdict.of(self.fit, validation, self.causes, why if isinstance(why := self.replays[model], str) else "")
-            for model, validation in self.torques.items()
-        }
+        why = {model: found for model, found in self.replays.items() if isinstance(found, str)}
+        return {model: Verdict.of(self.fit, v, self.causes, why.get(model, "")) for model, v in self.torques.items()}
 
     @property
     def alike(self) -> dict[tuple[str, str], list[str]]:
@@ -287,8 +283,7 @@ def _without(log: MotionLog, qd: Array, basis: Basis, laws: Mapping[Parameter, f
     """
     if not laws:
         return log
-    q = log.q.T
-    v = np.ascontiguousarray(qd.T)
+    q, v = log.q.T, np.ascontiguousarray(qd.T)
     conditions = {name: x.T for name, x in log.conditions.items()}
     state = State(q, v, lambda _: np.gradient(v, 1 / log.fs, axis=-1), conditions)
     friction, X = basis.of(list(laws)), np.array(list(laws.values()))

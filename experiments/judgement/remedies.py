@@ -89,9 +89,8 @@ def remedies(held_out: HeldOut) -> Iterator[str]:
     begin, tried = time.perf_counter(), 0
     for option, make in _others(held_out).items():
         spent = time.perf_counter() - begin
-        if spent > MOST_TIME or (option == AUTO and spent * AUTO_FITS > MOST_TIME * max(tried, 1)):
-            continue
-        if option == AUTO and least < TOLERABLE:  # what is well enough is not worth the time
+        # What is well enough is not worth the time.
+        if spent > MOST_TIME or (option == AUTO and (spent * AUTO_FITS > MOST_TIME * max(tried, 1) or least < TOLERABLE)):
             continue
         tried += 1
         try:
@@ -110,10 +109,7 @@ def remedies(held_out: HeldOut) -> Iterator[str]:
 def _others(held_out: HeldOut) -> dict[str, Callable[[], RobotModel]]:
     """Return the options, and what makes the robot that each describes."""
     request, found = held_out.fit.request, dict[str, Callable[[], RobotModel]]()
-    robot_model = request.robot_model
-    asked = robot_model.asked
-    mounting = robot_model.mounting
-    joints = robot_model.robot.joints
+    robot_model, asked, joints = request.robot_model, request.robot_model.asked, request.robot_model.robot.joints
     known = asked.prior or "links=file" in asked.hold
     if not known and request.method.estimator.takes_prior and not robot_model.basis.is_nonlinear:  # which takes minutes
         found["--prior file"] = lambda: replace(robot_model, asked=replace(asked, prior=("file",)))
@@ -124,7 +120,7 @@ def _others(held_out: HeldOut) -> dict[str, Callable[[], RobotModel]]:
     if len(joints) > 1 and not robot_model.tree.couplings:
         drive = f"motor{len(joints)}", ((joints[-2], 1.0), (joints[-1], 1.0))
         option = f"--coupling {drive[0]}={joints[-2]}+{joints[-1]}"
-        found[option] = lambda: replace(robot_model, mounting=replace(mounting, couplings=(drive,)))
+        found[option] = lambda: replace(robot_model, mounting=replace(robot_model.mounting, couplings=(drive,)))
     if robot_model.laws.standard and asked.friction == ("standard",):
         found[AUTO] = lambda: chosen_friction(request, held_out.fit.logs.fitted, most=1)[0].robot_model
     return found
@@ -154,8 +150,7 @@ def checks(judgement: Judgement, *, delay: bool, trials: bool = True) -> dict[st
         Whether other options are tried on the held-out data where no model is good.
     """
     result = judgement.fit
-    found = {LOG: warnings_of_logs(judgement), DELAY: [], FILE: undescribed(result.robot_model.robot)}
-    found |= {MOTION: [], MODEL: []}
+    found = {LOG: warnings_of_logs(judgement), DELAY: [], FILE: undescribed(result.robot_model.robot), MOTION: [], MODEL: []}
     if any(map(jumps_of, result.logs.fitted)):  # all else may be their doing: no advice can be drawn from it
         return found
     found[MOTION] += hidden_notes(result)
@@ -175,8 +170,7 @@ def checks(judgement: Judgement, *, delay: bool, trials: bool = True) -> dict[st
 def warnings_of_logs(judgement: Judgement) -> list[str]:
     """Doubts about the logs, fitted and held out."""
     logs, tree = judgement.fit.logs, judgement.fit.robot_model.tree
-    several = len(logs.fitted) > 1
-    every = [(f"{logs.name(k)}: " if several else "", log) for k, log in enumerate(logs.fitted)]
+    every = [(f"{logs.name(k)}: " if len(logs.fitted) > 1 else "", log) for k, log in enumerate(logs.fitted)]
     every += [(f"{name}: ", log) for name, log in (logs.held_out or {}).items()]
     untested = judgement.fit.diagnosis is None
     return [

@@ -11,6 +11,7 @@ from idbench.experiments.note import Note
 from idbench.identify import MotionLog, brisk_shares, showing_moves
 from idbench.identify.basis.block import NOT_NEGATIVE, Kind, named
 from idbench.identify.data.motion_log import never_logged
+from idbench.identify.judge.diagnosis import DRIVING
 from idbench.sim.robot.robot import Robot
 from idbench.sim.robot.time_steps import apparent_rotor_inertia
 from idbench.sim.robot.tree import kinematic_tree, unmodelled
@@ -42,20 +43,12 @@ MODEL = "the model"  # Subjects of warnings, in the order in which to check them
 def warnings_of_result(fit: Fit) -> dict[str, list[str]]:
     """Symptoms of a bad identification, and parameters that the log leaves open, by subject."""
     log = [*wrong_sign(fit), *unlike_file(fit), *_seems_simulated(fit)]
-    motion = list[str]()
-    model = list[str]()
-    name = fit.leading
-    negative = _negative(fit, name)
-    linked = list(_link_side(fit)) if not log else []
-    model += linked
-    if negative and not log and not linked:
+    name, motion = fit.leading, list(_too_little(fit, fit.leading))
+    model = [] if log else list(_link_side(fit))
+    if (negative := _negative(fit, name)) and not log and not model:
         model.append(f"{', '.join(negative)} below zero in the {name} model: is the torque's meaning or delay wrong?")
-    little = list(_too_little(fit, name))
-    motion += little
-    model += [] if little else list(_badly_explained(fit, name))
-    if not (log or motion or model):
-        motion = _poorly_known(fit)
-    return {LOG: log, MOTION: motion, MODEL: model}
+    model += [] if motion else _badly_explained(fit, name)
+    return {LOG: log, MOTION: motion if log or motion or model else _poorly_known(fit), MODEL: model}
 
 
 def _seems_simulated(fit: Fit) -> Iterator[str]:
@@ -146,19 +139,15 @@ def _badly_explained(fit: Fit, name: str) -> Iterator[str]:
     poor = {j: share for j, share in shares.items() if share < WELL_EXPLAINED}
     if not poor or fit.logs.fitted[0].poses:
         return
-    poorly = ", ".join(f"{_share(share)} of tau{j + 1}" for j, share in poor.items())
-    others = [o for o, shares in fit.explained.items() if all(shares[j] >= WELL_EXPLAINED for j in poor)]
-    if others:
+    sizes = {j: f"{100 * share:.0f} %" if share > 0 else "nothing" for j, share in poor.items()}
+    poorly = ", ".join(f"{size} of tau{j + 1}" for j, size in sizes.items())
+    if others := [o for o, shares in fit.explained.items() if all(shares[j] >= WELL_EXPLAINED for j in poor)]:
         yield (
             f"the {name} model explains {poorly}, where the {others[0]} model explains at least {100 * WELL_EXPLAINED:.0f} %: "
             f"noise of the velocities, or too little motion of {', '.join(joints[j] for j in poor)}; take the {others[0]} model"
         )
     else:
         yield f"the {name} model explains {poorly}: are units, signs, order of columns and the torque's delay right?"
-
-
-def _share(share: float) -> str:
-    return f"{100 * share:.0f} %" if share > 0 else "nothing"
 
 
 def hidden_notes(fit: Fit) -> list[str]:
@@ -195,12 +184,9 @@ def wrong_sign(fit: Fit) -> list[Note]:
     """Torques with the wrong sign: those whose friction drives their joint."""
     model, estimate = next(iter(fit.estimates.items()))
     values = zip(fit.basis.parameters, estimate.X, estimate.own_sigma, strict=True)
-    known = {(p.kind, p.joint): (x, sigma) for p, x, sigma in values}
-    nothing = (0.0, 0.0)
-    wrong = list[str]()
+    known, wrong = {(p.kind, p.joint): (x, sigma) for p, x, sigma in values}, list[str]()
     for j, joint in enumerate(fit.robot_model.robot.joints):
-        viscous, _ = known.get(("viscous friction", j), nothing)
-        coulomb, sigma = known.get(("Coulomb friction", j), nothing)
+        (viscous, _), (coulomb, sigma) = (known.get((kind, j), (0.0, 0.0)) for kind in DRIVING)
         if viscous < 0 and coulomb < -SIGNIFICANT * sigma:
             wrong.append(joint)
     if not wrong:
@@ -238,11 +224,6 @@ def _moves(robot_model: RobotModel, names: Sequence[str]) -> str:
     moves: dict[tuple[int, ...], list[str]] = {}
     for name, joints in showing_moves(robot_model.tree, robot_model.grouping, names).items():
         moves.setdefault(joints, []).append(name)
-    few_first = sorted(moves.items(), key=lambda move: len(move[0]))
-    return "; ".join(f"{', '.join(shown)} (move {_joints(robot_model, joints)})" for joints, shown in few_first)
-
-
-def _joints(robot_model: RobotModel, joints: Sequence[int]) -> str:
-    return (
-        "all joints" if len(joints) == robot_model.robot.n > 1 else " with ".join(robot_model.robot.joints[j] for j in joints)
-    )
+    robot, few_first = robot_model.robot, sorted(moves.items(), key=lambda move: len(move[0]))
+    words = {js: "all joints" if len(js) == robot.n > 1 else " with ".join(robot.joints[j] for j in js) for js in moves}
+    return "; ".join(f"{', '.join(shown)} (move {words[joints]})" for joints, shown in few_first)

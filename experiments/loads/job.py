@@ -19,16 +19,8 @@ from idbench.experiments.identification.load import in_band, load
 from idbench.experiments.identification.method import Method
 from idbench.experiments.identification.request import Request
 from idbench.experiments.identification.robot_model import RobotModel, absolute
+from idbench.experiments.loads import loads_text as text
 from idbench.experiments.loads.known_load import LoadJudgement, payload_parameters
-from idbench.experiments.loads.loads_text import (
-    doubts_of_gains,
-    gains_summary,
-    gains_table,
-    payload_lines,
-    payload_summary,
-    payload_table,
-    words_of_payload,
-)
 from idbench.experiments.loads.simulated import Pairs
 from idbench.experiments.requests.jobs import GainsRequest, LoadRequest, PayloadRequest
 from idbench.experiments.text import printed
@@ -124,10 +116,10 @@ def payload_of(asked: PayloadRequest) -> LoadFit:
 def _payload(judgement: LoadJudgement, notes: Sequence[str], found: Mapping[str, PayloadEstimate | str]) -> LoadFit:
     ways = {way: payload for way, payload in found.items() if isinstance(payload, PayloadEstimate)}
     leading, robot_model = next(iter(ways.values())), judgement.request.robot_model
-    lines = (*payload_lines(found, leading), *notes)
-    content = {"robot": robot_model.name, **payload_summary(found, ways)}
-    table = payload_table(ways, robot_model.robot.joints[-1])
-    return LoadFit(judgement, found, words_of_payload(leading), table, lines, content, leading)
+    lines = (*text.payload_lines(found, leading), *notes)
+    content = {"robot": robot_model.name, **text.payload_summary(found, ways)}
+    table = text.payload_table(ways, robot_model.robot.joints[-1])
+    return LoadFit(judgement, found, text.words_of_payload(leading), table, lines, content, leading)
 
 
 def gains_of(asked: GainsRequest) -> LoadFit:
@@ -148,11 +140,11 @@ def gains_of(asked: GainsRequest) -> LoadFit:
         judgement.with_gains(gains / given),
         found,
         f"gains {' '.join(f'{gain:.4g}' for gain in gains)}",
-        gains_table(found, given.tolist(), joints),
+        text.gains_table(found, given.tolist(), joints),
         (f"to read logs with them: --gain {' '.join(f'{gain:.5g}' for gain in gains)}", *notes),
-        {"robot": robot_model.name, **gains_summary(found, given.tolist(), joints)},
+        {"robot": robot_model.name, **text.gains_summary(found, given.tolist(), joints)},
         gains=gains,
-        doubts={"the gains": doubts_of_gains(found, joints)},
+        doubts={"the gains": text.doubts_of_gains(found, joints)},
     )
 
 
@@ -179,18 +171,15 @@ def _loaded(asked: LoadRequest) -> tuple[LoadJudgement, tuple[str, ...]]:
     )
     if asked.cutoff is not None:
         request = in_band(request, asked.cutoff)
-    paths, band = (*asked.unloaded, *asked.log), asked.cutoff is None
-    first = len(asked.unloaded)
+    paths, band, first = (*asked.unloaded, *asked.log), asked.cutoff is None, len(asked.unloaded)
     loaded = load(paths, asked, request, band=band, more=len(LETTERS), alike=first or None)
-    request = loaded.request
-    notes = list(loaded.notes)
+    request, notes = loaded.request, list(loaded.notes)
     without, with_it = loaded.logs(slice(first)), loaded.logs(slice(first, None))
     if robot_model.laws.auto or robot_model.laws.smooth:
         request, choice = chosen_friction(request, without or with_it)
         notes += words(choice, request.robot_model.laws.names, robot_model.robot.joints)
-    robot_model = request.robot_model
-    standard = robot_model.grouping.standard
-    robot = LoadedRobot(robot_model.tree, standard, without, with_it, request.processing, request.method.estimator, known)
+    tree, standard = request.robot_model.tree, request.robot_model.grouping.standard
+    robot = LoadedRobot(tree, standard, without, with_it, request.processing, request.method.estimator, known)
     gain = np.array(loaded.read[-1].columns.gain or 1.0)
     return LoadJudgement(robot, request, loaded.names, gain, _gains_command(asked)), tuple(notes)
 

@@ -115,8 +115,7 @@ class LoadJudgement:
         """How well the estimate of all logs predicts the torques of each."""
         found, joints = self.estimate, self.request.robot_model.robot.joints
         each = [Problem((log,), found.problem.basis, ExplicitModel(), self.robot.chain) for log in found.problem.logs]
-        judged = [validate(problem, found.X, found.covariance) for problem in each]
-        of_logs = zip(self.names, judged, strict=True)
+        of_logs = zip(self.names, (validate(problem, found.X, found.covariance) for problem in each), strict=True)
         return {name: Verdict(joints, validation, causes=self.causes) for name, validation in of_logs}
 
     def word(self, doubts: Mapping[str, Sequence[str]]) -> str:

@@ -101,8 +101,7 @@ def gains_table(found: GainEstimate, given: Sequence[float], joints: Sequence[st
 
 def doubts_of_gains(found: GainEstimate, joints: Sequence[str]) -> list[str]:
     """Warnings about gains of which the payload says nothing."""
-    lost = [joint for joint, shown in zip(joints, found.shown, strict=True) if not shown]
-    if not lost:
+    if not (lost := [joint for joint, shown in zip(joints, found.shown, strict=True) if not shown]):
         return []
     return [
         f"the payload says nothing of the gain of {', '.join(lost)}: sigma above {100 * VAGUE:g} % of it; hold the payload "

@@ -104,16 +104,14 @@ class Pairs:
 
     def robot(self, run: int, known: Mapping[str, float], gains: Array | float = 1.0) -> LoadedRobot:
         """Return the robot with the logs of a run, currents as if its drives had these gains."""
-        logs = [replace(each.alone(run), tau=each.alone(run).tau / gains) for each in self.simulated]
-        first, second = ((log,) for log in logs)
+        logs = (each.alone(run) for each in self.simulated)
+        first, second = ((replace(log, tau=log.tau / gains),) for log in logs)
         return LoadedRobot(self.robot_model.tree, self.robot_model.grouping.standard, first, second, known=known)
 
     def payloads(self, told: Progress) -> dict[str, PairScore]:
         """Accuracy of each way for the payload."""
-        found = dict[str, PairScore]()
-        for number, (way, identify) in enumerate(WAYS.items()):
-            found[way] = self._scored(partial(self._payload, identify), told, number, len(WAYS))
-        return found
+        ways = enumerate(WAYS.items())
+        return {way: self._scored(partial(self._payload, of), told, k, len(WAYS)) for k, (way, of) in ways}
 
     def gains(self, known: Mapping[str, float], told: Progress) -> PairScore:
         """Accuracy of gains that are drawn for each run, given the known payload."""
@@ -129,16 +127,12 @@ class Pairs:
     def _payload(self, identify: Callable[[LoadedRobot], PayloadEstimate], run: int) -> Found:
         """Return names, estimate, sigma and truth of the payload's base parameters in a run."""
         robot = self.robot(run, {})
-        found, p = identify(robot), len(robot.standard.names)
-        own = [i for i, k in enumerate(robot.both.kept) if k >= p]
-        base = robot.both.K[own, p:] @ np.array([self.truth[x] for x in LETTERS])
+        found, base = identify(robot), np.array(list(robot.payload.values())) @ np.array([self.truth[x] for x in LETTERS])
         return found.names, found.X, found.sigma, base
 
     def _scored(self, one: Callable[[int], Found], told: Progress, number: int = 0, count: int = 1) -> PairScore:
-        names: tuple[str, ...] = ()
-        start = perf_counter()
-        rows = list[tuple[Array, Array, Array]]()
-        failures = list[str]()
+        names, start = tuple[str, ...](), perf_counter()
+        rows, failures = list[tuple[Array, Array, Array]](), list[str]()
         for run in range(self.runs):
             try:
                 names, X, sigma, truth = one(run)

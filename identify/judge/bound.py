@@ -52,9 +52,7 @@ def cramer_rao(basis: Basis, X: Array, q: Array, qd: Array, fs: float, noise: No
     if reversals:
         weight = motion.through_reversals(A, B, C)
     variance = np.moveaxis((noise.torque[:, None] + (1 - weight) * UNKNOWN * motion.jump[:, None]) ** 2, -1, -2)
-    n = basis.n
-    p = len(X)
-    runs = q.shape[:-2]
+    n, p, runs = basis.n, len(X), q.shape[:-2]
     P = np.broadcast_to(np.diag([1.0] * n + [100.0] * n), (*runs, 2 * n, 2 * n)).copy()
     slope, information = np.zeros((*runs, 2 * n, p)), np.zeros((*runs, p, p))
     R = np.diag(noise.position**2)
@@ -107,8 +105,7 @@ class _Motion:
         F[..., n:, :n], F[..., n:, n:] = -np.matmul(inverse, K), -np.matmul(inverse, D)
         push = np.concatenate([np.zeros_like(inverse), inverse], axis=-2)
         term = np.broadcast_to(np.eye(2 * n), F.shape)
-        A = np.zeros_like(F)
-        integral = np.zeros_like(F)
+        A, integral = np.zeros_like(F), np.zeros_like(F)
         for i in range(1, TERMS + 1):
             A, integral = A + term, integral + term * (T / i)
             term = np.matmul(F, term) * (T / i)
@@ -131,8 +128,7 @@ class _Motion:
         some, every = (*runs, period), np.arange(len(period))
         sign = np.sign(after[crosses])
         step = np.linalg.inv(self.M[some])[every, :, joint] * (self.jump[joint] * sign)[:, None]
-        early = np.abs(before[crosses])
-        late = np.abs(after[crosses])
+        early, late = np.abs(before[crosses]), np.abs(after[crosses])
         d = self.T * sign * step[every, joint]
         total = early + late + d
         share = 2 * early / (total + np.sqrt(total**2 - 4 * d * early))

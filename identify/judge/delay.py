@@ -16,7 +16,7 @@ from idbench.identify.iterate import minimum, not_converged
 from idbench.identify.judge.delay_step import ROUNDS, SETTLED, delay_step, newton
 from idbench.identify.models import ExplicitModel
 from idbench.identify.rows.chain import Chain, idbench_chain
-from idbench.identify.rows.rows import Rows, manageable
+from idbench.identify.rows.rows import manageable
 
 RANGE = (-0.02, 0.05)
 """Delays [s] of a first look: a filtered measurement is late by some milliseconds, a slow controller by some tens."""
@@ -67,10 +67,7 @@ class DelayEstimate:
 
 
 def estimate_delay(
-    log: MotionLog | Sequence[MotionLog],
-    basis: Basis,
-    chain: Chain | None = None,
-    within: tuple[float, float] | None = None,
+    log: MotionLog | Sequence[MotionLog], basis: Basis, chain: Chain | None = None, within: tuple[float, float] | None = None
 ) -> DelayEstimate:
     """Return the delay with which the explicit model explains the torques best.
 
@@ -123,10 +120,7 @@ def estimate_delay(
 
 
 def estimate_joint_delays(
-    log: MotionLog | Sequence[MotionLog],
-    basis: Basis,
-    chain: Chain | None = None,
-    within: tuple[float, float] | None = None,
+    log: MotionLog | Sequence[MotionLog], basis: Basis, chain: Chain | None = None, within: tuple[float, float] | None = None
 ) -> DelayEstimate:
     """Return the delay of each joint's torque, beside the parameters in generalized least squares.
 
@@ -145,12 +139,11 @@ def estimate_joint_delays(
     """
     common = estimate_delay(log, basis, chain, within)
     logs = manageable([log] if isinstance(log, MotionLog) else list(log))
-    chain = chain or idbench_chain()
+    problem = Problem(tuple(logs), basis, ExplicitModel(), chain or idbench_chain())
     try:
-        Problem(tuple(logs), basis, ExplicitModel(), chain).rows.factors.together.check()
+        problem.rows.factors.together.check()
     except ExcitationError as error:
-        basis = _without_hidden(basis, error)
-    problem = Problem(tuple(logs), basis, ExplicitModel(), chain)
+        problem = problem.with_basis(_without_hidden(basis, error))
 
     def of(delays: Array) -> DelayEstimate:
         mean = float(delays.mean())
@@ -216,7 +209,7 @@ def _is_read(logs: Sequence[MotionLog], chain: Chain) -> bool:
 
 class _Search:
     def __init__(self, logs: list[MotionLog], basis: Basis, chain: Chain, within: tuple[float, float]) -> None:
-        self._logs, self._within = logs, within
+        self._within = within
         halos = [chain.halo(log.fs, replace(log.torque, delay=delay)) for log in logs for delay in within]
         # The same rows at all delays, or their misfits could not be compared.
         self._chain = replace(chain, trim=max(*halos, chain.trim or 0.0))
@@ -241,22 +234,17 @@ class _Search:
 
         Steps leave it where the model is far off.
         """
-        found, sigma, move = newton(
-            lambda delay: replace(self._problem, logs=self._delayed(float(delay[0]))), np.array([delay]), _slopes, within
-        )
+        found, sigma, move = newton(lambda delay: self._delayed(float(delay[0])), np.array([delay]), _slopes, within)
         if move > SETTLED:
             return DelayEstimate(delay, float(sigma[0]))
         estimate = DelayEstimate(float(found[0]), float(sigma[0]))
-        return estimate if len(self._logs) == 1 else _with_scatter(_delayed(self._problem, estimate), estimate)
+        return estimate if len(self._problem.logs) == 1 else _with_scatter(self._delayed(estimate.delay), estimate)
 
-    def _at(self, delay: float) -> Rows:
-        """Return the rows at a delay, of which Y alone depends on it."""
-        parts = zip(self._rows.maps, self._delayed(delay), strict=True)  # with the prefilter that was found for their motion
-        torques = (rows.measurement(self._chain.signals(log, rows.signals).torque.mean) for rows, log in parts)
-        return replace(self._rows, Y=np.concatenate(list(torques)))
-
-    def _delayed(self, delay: float) -> tuple[MotionLog, ...]:
-        return tuple(replace(log, torque=replace(log.torque, delay=delay, lags=())) for log in self._logs)
+    def _delayed(self, delay: float) -> Problem:
+        return _delayed(self._problem, DelayEstimate(delay, 0.0))
 
     def _misfit(self, delay: float) -> float:
-        return float(self._at(delay).factors.misfit())
+        """Misfit of the rows at a delay, of which Y alone depends on it."""
+        parts = zip(self._rows.maps, self._delayed(delay).logs, strict=True)  # with the prefilter found for their motion
+        torques = (rows.measurement(self._chain.signals(log, rows.signals).torque.mean) for rows, log in parts)
+        return float(replace(self._rows, Y=np.concatenate(list(torques))).factors.misfit())

@@ -25,12 +25,9 @@ def delay_step(problem: Problem, slopes: Sequence[Array]) -> tuple[Array, Array]
     slopes : sequence of Array, shape (r, k)
         D = dY/d(delays) of the rows of each log [N m/s]; a column of zeros gives a step of zero.
     """
-    parts, stretches = problem.parts, Stretches.of(problem.parts)
-    rows = [
-        part.whitening.whiten(np.column_stack([part.unbiased.W, -D, part.rows.Y]))
-        for part, D in zip(parts, slopes, strict=True)
-    ]
-    found = left_out(stretches.products(parts, rows))[:, -slopes[0].shape[-1] :]
+    parts, each = problem.parts, zip(problem.parts, slopes, strict=True)
+    rows = [part.whitening.whiten(np.column_stack([part.unbiased.W, -D, part.rows.Y])) for part, D in each]
+    found = left_out(Stretches.of(parts).products(parts, rows))[:, -slopes[0].shape[-1] :]
     return found[-1], np.sqrt(np.diagonal(jackknife(found[:-1])))
 
 

@@ -1,6 +1,6 @@
 """Which moves show a parameter."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from functools import cache
 from itertools import combinations
 from typing import NamedTuple
@@ -131,12 +131,10 @@ def showing_moves(tree: KinematicTree, grouping: BaseParameters, names: Sequence
     def shown(joints: tuple[int, ...]) -> Array:
         return _shown(basis, _only(states, joints))
 
-    whole = shown(tuple(range(tree.n)))
-    found = {}
-    for name in names:
-        i = basis.names.index(name)
-        found[name] = next((joints for joints in _moves(tree.n) if shown(joints)[i] >= ENOUGH * whole[i]), tuple(range(tree.n)))
-    return found
+    every = tuple(range(tree.n))
+    moves = [move for count in range(1, min(MOST_JOINTS, tree.n) + 1) for move in combinations(every, count)]
+    whole, places = shown(every), {name: basis.names.index(name) for name in names}
+    return {name: next((move for move in moves if shown(move)[i] >= ENOUGH * whole[i]), every) for name, i in places.items()}
 
 
 def brisk_shares(tree: KinematicTree, basis: Basis, X: Array, sigma: Array) -> Array:
@@ -162,11 +160,6 @@ def brisk_shares(tree: KinematicTree, basis: Basis, X: Array, sigma: Array) -> A
     torque = np.sqrt(np.mean(np.einsum("jpt,p->jt", W, X) ** 2, axis=-1))
     parts = np.sqrt(np.mean(W**2, axis=-1)) * sigma
     return np.max(parts / np.maximum(torque, TINY)[:, None], axis=0)
-
-
-def _moves(n: int) -> Iterator[tuple[int, ...]]:
-    for count in range(1, min(MOST_JOINTS, n) + 1):
-        yield from combinations(range(n), count)
 
 
 def _only(states: Array, joints: Sequence[int]) -> Array:

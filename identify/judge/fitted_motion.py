@@ -93,9 +93,11 @@ class FittedMotion:
 
     def faster(self) -> Array:
         """Return the derivative of the torque by the rate of the clock: qd (1 + h), qdd (1 + 2 h)."""
-        state, h = self.state, SMALL
-        ahead = _state(state.q, state.qd * (1 + h), state.qdd * (1 + 2 * h))
-        return np.asarray((self._of(*self.rigid, ahead) - self.load) / h) + self._friction_slope()
+        q, qd, qdd, h = self.state.q, self.state.qd * (1 + SMALL), self.state.qdd, SMALL
+        of_rigid = (self._of(*self.rigid, _state(q, qd, qdd * (1 + 2 * h))) - self.load) / h
+        ahead = _state(q, qd, qdd)
+        rest = self._of(self.basis, self.X, ahead) - self._of(*self.rigid, ahead)  # friction, and what else is no rigid torque
+        return np.asarray(of_rigid + (rest - (self.torque - self.load)) / h)
 
     def on(self, changed: Callable[[KinematicTree], KinematicTree]) -> Array | None:
         """Derivative of the torque by a change of the robot's tree, by a step of `SMALL`; None if it has no tree."""
@@ -113,13 +115,6 @@ class FittedMotion:
     def tree(self) -> KinematicTree | None:
         """Of the links, if they are those of a tree."""
         return tree_of(self.basis)
-
-    def _friction_slope(self) -> Array:
-        """Return qd times the slope of what is no rigid torque."""
-        state, h = self.state, SMALL
-        rest, ahead = self.torque - self.load, _state(state.q, state.qd * (1 + h), state.qdd)
-        more = self._of(self.basis, self.X, ahead) - self._of(*self.rigid, ahead)
-        return np.asarray((more - rest) / h)
 
     def _of(self, basis: Basis, X: Array, state: State) -> Array:
         """Return the torque of a state, of which the motion may be a part that is repeated."""

@@ -100,13 +100,13 @@ class _Choice:
     def _better(self, laws: Sequence[tuple[str, ...]], found: Sequence[Sequence[str]]) -> list[tuple[str, ...]]:
         """Return the laws with one more of each joint: of its best two that which is better with shapes of its own."""
         first = [(*own, names[0]) if names else own for own, names in zip(laws, found, strict=True)]
-        solvable = bool(np.isfinite(self._search(first, {}).errors).all())
+        search = self._search(first, {})
+        solvable = bool(np.isfinite(search.errors).all())
         # Where one law cannot be solved for, it must not decide about those of other joints.
         others = first if solvable else list(laws)
         shaped = [any(isinstance(self.candidates[name], ShapedFriction) for name in names[:BEST]) for names in found]
         # What is not compared with others is asked here whether it is possible.
-        possible = self._search(first, {}) if solvable else None
-        plain = (possible and not own and not self._spoils(possible, laws, j) for j, own in enumerate(shaped))
+        plain = (solvable and not own and not self._spoils(search, laws, j) for j, own in enumerate(shaped))
         each = enumerate(zip(found, plain, strict=True))
         return [first[j] if only or not names else self._best_of(others, laws[j], names, j) for j, (names, only) in each]
 
@@ -179,8 +179,7 @@ class _Choice:
         if not isinstance(self.problem.chain.mask, NoMask):
             return ()
         letters = {self._replaced(name) for name in laws[j]}
-        names = [name for x in letters for name in self._letters(j, x)]
-        if not names:
+        if not (names := [name for x in letters for name in self._letters(j, x)]):
             return ()
         with_it, without = (self._search(laws, {}, gone).errors[j] for gone in ([], names))
         return tuple(letters) if (1 - WORTH) * without < with_it else ()

@@ -99,10 +99,9 @@ class HeldOutProducts:
         joined = np.swapaxes(rows.joined.reshape(-1, rows.kinds, len(basis.names) + 1), 0, 1)
         first = len(basis.names) - basis.n
         speed = np.abs(np.array([joined[j, :, first + j] for j in range(basis.n)]))
-        joined = np.concatenate([joined[..., :first], joined[..., -1:]], axis=-1)
-        level = start.factors.squares(X)
-        weight = start.factors.rows / np.maximum(level, TINY)
-        return cls(start, _held(joined, speed), weight, len(start.names), places)
+        held = _held(np.concatenate([joined[..., :first], joined[..., -1:]], axis=-1), speed)
+        weight = start.factors.rows / np.maximum(start.factors.squares(X), TINY)
+        return cls(start, held, weight, len(start.names), places)
 
     def in_sigmas(self, letters: str, j: int) -> float:
         """Return the estimate of a parameter of a joint without further laws, in sigma of independent rows, shapes free."""
@@ -119,10 +118,8 @@ class HeldOutProducts:
     def likely(self, law: str, j: int) -> list[list[int]]:
         """Return the columns of a law at the shapes that explain all rows best, the best first."""
         if (law, j) not in self._likely:
-            misfits = []
-            for own in self.places[law, j]:
-                columns = [*range(self.p), *own]
-                misfits.append(squares(self._every, columns, solved(self._every, columns)))
+            every = ([*range(self.p), *own] for own in self.places[law, j])
+            misfits = [squares(self._every, columns, solved(self._every, columns)) for columns in every]
             order = np.argsort(misfits, kind="stable")[:LOOKED]
             self._likely[law, j] = [self.places[law, j][int(i)] for i in order]
         return self._likely[law, j]
@@ -184,9 +181,7 @@ class HeldOutProducts:
         Shapes are those that fit the rest best.
         """
         judged, fitted = self.held[fold][j], self.fitted(fold, j)
-        least = np.inf
-        best = np.inf
-        spread = 0.0
+        least, best, spread = np.inf, np.inf, 0.0
         # The fastest motion has had no say in the shapes: they are those that fit the slower best.
         every = [[]] if law is None else self.places[law, j] if fold == FOLDS else self.likely(law, j)
         for own in every:
@@ -194,7 +189,8 @@ class HeldOutProducts:
             X = solved(fitted, columns)
             if (misfit := squares(fitted, columns, X)) < least:
                 least, best = misfit, squares(judged, columns, X)
-                spread = sigma_squares(fitted, judged, columns) if fold == FOLDS else 0.0
+                sigma_squares = _inverse(fitted, columns) * judged[np.ix_(columns, columns)] if fold == FOLDS else 0.0
+                spread = float(np.sum(sigma_squares))
         return best, spread
 
 
@@ -228,11 +224,6 @@ def _held(joined: Array, speed: Array) -> Array:
 def solved(products: Array, columns: Sequence[int]) -> Array:
     """Least-squares solution from products of some columns."""
     return solution(products[np.ix_([*columns, -1], [*columns, -1])])
-
-
-def sigma_squares(products: Array, judged: Array, columns: Sequence[int]) -> float:
-    """Return the squares that the sigma of a fit, with rows of unit variance, makes in others."""
-    return float(np.sum(_inverse(products, columns) * judged[np.ix_(columns, columns)]))
 
 
 def _inverse(products: Array, columns: Sequence[int]) -> Array:

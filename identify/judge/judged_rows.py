@@ -32,8 +32,7 @@ def as_judged(problem: Problem) -> Problem:
 
 def shares(rows: RowMap) -> Array:
     """Return the share of a constant that the mask leaves in each row, shape (..., kind, count); 1 where nothing is masked."""
-    ones = np.ones_like(rows.inside)
-    whole = rows.kernel.apply(ones)
+    whole = rows.kernel.apply(np.ones_like(rows.inside))
     if np.abs(whole).min(initial=np.inf) < FEW * np.abs(rows.response).sum():  # the operator leaves nothing of a constant
         return rows.outside
     return np.asarray(rows.outside * rows.kernel.apply(rows.inside) / whole)

@@ -44,8 +44,7 @@ def position_zero(m: FittedMotion, j: int) -> Rows:
 
 def position_scale(m: FittedMotion, j: int) -> Rows:
     """Torque per relative scale error of a position [N m]."""
-    state = m.state
-    return whole_rows(-m.moved(j, state.q[j], state.qd[j], state.qdd[j]))
+    return whole_rows(-m.moved(j, m.state.q[j], m.state.qd[j], m.state.qdd[j]))
 
 
 def late_position(m: FittedMotion, j: int) -> Rows:
@@ -127,8 +126,7 @@ def link_length(m: FittedMotion, j: int, axis: int) -> Rows:
     """Return columns of an origin that is farther along an axis."""
 
     def longer(tree: KinematicTree) -> KinematicTree:
-        joint = tree.joints[j]
-        moved = replace(joint, position=joint.position + SMALL * np.eye(3)[axis])
+        moved = replace(tree.joints[j], position=tree.joints[j].position + SMALL * np.eye(3)[axis])
         return replace(tree, joints=(*tree.joints[:j], moved, *tree.joints[j + 1 :]))
 
     return whole_rows(m.on(longer)) if j else {}
@@ -177,13 +175,7 @@ def drag(m: FittedMotion, j: int) -> float:
     return friction(m, j) / rms(m.state.qd[j]) ** 2
 
 
-def alike(m: FittedMotion, j: int) -> float:
-    """Return 1, whatever the joint."""
-    del m, j
-    return 1.0
-
-
-def of_every(f: Signal, scale: Callable[[FittedMotion, int], float] = alike) -> Columns:
+def of_every(f: Signal, scale: Callable[[FittedMotion, int], float] = lambda _, __: 1.0) -> Columns:
     """Return a column of all joints, whose drives are alike: each has its signal, times a scale of its own."""
     return lambda m, _: {j: scale(m, j) * f(m, j) for j in range(m.n)}
 
@@ -194,11 +186,6 @@ def asymmetric(m: FittedMotion, j: int) -> tuple[Rows, ...]:
     size = [friction(m, k) for k in range(m.n)]
     speed = [np.abs(qd) / rms(qd) for qd in m.state.qd]
     return {k: size[k] * speed[k] for k in range(m.n)}, {k: size[k] * np.ones_like(m.t) for k in range(m.n)}
-
-
-def late(m: FittedMotion, j: int) -> Array:
-    """Torque error per delay [N m/s]."""
-    return -m.rate(m.torque[j])
 
 
 def pushed(m: FittedMotion, j: int, axis: int) -> Rows:

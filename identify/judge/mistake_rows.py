@@ -10,20 +10,10 @@ from idbench.identify.arrays import Array
 from idbench.identify.basis.basis import Basis
 from idbench.identify.basis.newton_euler import torques
 from idbench.identify.estimators.log_rows import LogRows, split_by_log
+from idbench.identify.judge import mistakes
 from idbench.identify.judge.fitted_motion import FittedMotion
 from idbench.identify.judge.mistake_columns import Rows
-from idbench.identify.judge.mistakes import (
-    BASE,
-    COGGING,
-    COLLISION,
-    COMMUTATION,
-    ECCENTRIC,
-    FROM_AN_INSTANT,
-    GAIN,
-    OF_JOINTS,
-    OF_ROBOT,
-    Mistake,
-)
+from idbench.identify.judge.mistakes import Mistake
 from idbench.identify.judge.ripples import WAVES, likely_waves
 from idbench.identify.judge.stretches import held_torque
 from idbench.identify.signals.signals import State
@@ -73,14 +63,12 @@ class MistakeRows:
 
     def every(self) -> list[Candidate]:
         """Return the mistakes of joints and of the robot, and those that are looked for from an instant on."""
-        joints, robot = range(self.basis.n), (None,)
-        asked = [(m, j) for m in OF_JOINTS if m is not GAIN for j in (self._hinges if m is ECCENTRIC else joints)] + [
-            (m, j) for m in (*OF_ROBOT, *FROM_AN_INSTANT) for j in robot
-        ]
-        found = [*self._gains(), *self._made(asked)]
+        joints, of_joints = range(self.basis.n), [m for m in mistakes.OF_JOINTS if m is not mistakes.GAIN]
+        asked = [(m, j) for m in of_joints for j in (self._hinges if m is mistakes.ECCENTRIC else joints)]
+        found = [*self._gains(), *self._made([*asked, *((m, None) for m in (*mistakes.OF_ROBOT, *mistakes.FROM_AN_INSTANT))])]
         slips = [replace(c, mistake=c.mistake._replace(cause="slip")) for c in found if c.mistake.cause == "zero"]
-        held = [c for c in found if c.mistake in FROM_AN_INSTANT]
-        steady = [c for c in found if c.mistake not in FROM_AN_INSTANT]
+        held = [c for c in found if c.mistake in mistakes.FROM_AN_INSTANT]
+        steady = [c for c in found if c.mistake not in mistakes.FROM_AN_INSTANT]
         return [*steady, *(late for c in (*slips, *held) for late in self._from_instants(c))]
 
     def of_robot(self, mistake: Mistake) -> Iterator[Candidate]:
@@ -89,13 +77,13 @@ class MistakeRows:
 
     def _gains(self) -> Iterator[Candidate]:
         """Yield torques that are too large beside others, from rows of what is predicted: parameters leave little of them."""
-        held = np.concatenate([held_torque(part) for part in self.parts])
+        held = held_torque(self.parts)
         predicted = np.concatenate([part.rows.predicted(self.X) for part in self.parts]) + held
         measured = np.concatenate([part.rows.Y for part in self.parts]) + held
         group = np.concatenate([part.rows.group for part in self.parts])
         driven = [j for j in range(self.basis.n) if np.any(measured[group == j])]
         for j in driven if len(driven) > 1 else ():
-            yield self._candidate(GAIN, j, np.where(group == j, predicted, 0.0)[:, None])
+            yield self._candidate(mistakes.GAIN, j, np.where(group == j, predicted, 0.0)[:, None])
 
     def pushed(self, e: Array) -> Iterator[Candidate]:
         """Yield a collision of each joint where its residuals e, shape (r,), are largest for so long."""
@@ -108,7 +96,7 @@ class MistakeRows:
             k = int(sums.argmax())
             inside = np.zeros((len(x), kinds))
             inside[max(0, k - width // 2) : k - width // 2 + width, j] = 1.0
-            yield self._candidate(COLLISION, j, inside.reshape(-1, 1), float(time[k * kinds]))
+            yield self._candidate(mistakes.COLLISION, j, inside.reshape(-1, 1), float(time[k * kinds]))
 
     def shaken(self, e: Array) -> Iterator[Candidate]:
         """Yield motions of the base, along each axis, at the highest line in the spectrum of residuals e, shape (r,)."""
@@ -119,15 +107,15 @@ class MistakeRows:
         if not some.any() or power[some].max() < LINE * np.median(power[some]):
             return
         line = 2 * np.pi * f[some][power[some].argmax()] * self._time
-        for c in self._made([(m, None) for m in BASE]):
-            plain = c.plain * np.stack([np.sin(line), np.cos(line)], axis=-1)
-            yield self._candidate(c.mistake, None, plain)
+        for c in self._made([(m, None) for m in mistakes.BASE]):
+            yield self._candidate(c.mistake, None, c.plain * np.stack([np.sin(line), np.cos(line)], axis=-1))
 
     def rippled(self, e: Array) -> Iterator[Candidate]:
         """Yield ripples of hinges, of the waves that residuals e, shape (r,), have most of."""
         if self.parts[0].signals.log.poses:
             return
-        for mistake, sizes in (COGGING, [np.ones_like(x) for x in self._torques]), (COMMUTATION, self._torques):
+        ones = [np.ones_like(x) for x in self._torques]
+        for mistake, sizes in (mistakes.COGGING, ones), (mistakes.COMMUTATION, self._torques):
             for j, k in likely_waves(self.parts, e, sizes, self._cutoff, self._hinges):
                 plain = np.concatenate([_wave(part, j, k, x[j]) for part, x in zip(self.parts, sizes, strict=True)])
                 yield self._candidate(mistake._replace(setting=float(k)), j, plain)

@@ -56,7 +56,7 @@ def motion_shares(problem: Problem, X: Array) -> list[MotionShare]:
         Its estimate.
     """
     rows, stretches = problem.rows, Stretches.of(problem.parts)
-    measured = rows.by_kind(rows.Y + np.concatenate([held_torque(part) for part in problem.parts]))
+    measured = rows.by_kind(rows.Y + held_torque(problem.parts))
     e = rows.by_kind((rows.Y - rows.predicted(X)) * rows.valid)
     place = np.concatenate([stretches.at(k, part.rows.time) for k, part in enumerate(problem.parts)])
     place = place.reshape(-1, rows.kinds)[:, 0]
@@ -127,6 +127,5 @@ def something_else(shares: Sequence[MotionShare]) -> Iterator[Suspect]:
     most, j = max(every, default=(0.0, 0))
     if most > WORTH_A_WORD:
         one, pair = shares[j], tuple(100 * x / max(shares[j].level, TINY) for x in (shares[j].rms, shares[j].noise))
-        cause = one.variable or "moment"
-        size = one.rms * one.share**0.5
+        cause, size = one.variable or "moment", one.rms * one.share**0.5
         yield Suspect("unknown", cause, j, (size,), (0.0,), "N m", 0.0, np.inf, (), (pair[0], pair[1]), 0.0)

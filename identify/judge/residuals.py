@@ -38,16 +38,9 @@ def noise_spectra(problem: Problem, levels: NoiseLevels, f: Array) -> tuple[Arra
     fs, some = signals.fs, slice(0, None, max(1, int(signals.fs / EVERY)))
     impulse = np.zeros(4 * int(np.ceil(problem.chain.halo(fs, signals.log.torque) * fs)) + 101)
     impulse[len(impulse) // 2] = 1.0
-    zero = np.zeros_like(impulse)
-    aligned, plain, rate, twice = (
-        gain_of(h, round(fs / f[1]))
-        for h in (
-            signals.torque_adjoint(impulse),
-            signals.position_adjoint((impulse, zero, zero)),
-            signals.position_adjoint((zero, impulse, zero)),
-            signals.position_adjoint((zero, zero, impulse)),
-        )
-    )
+    of_each = np.eye(3)[..., None] * impulse  # in position, velocity and acceleration
+    answers = signals.torque_adjoint(impulse), *(signals.position_adjoint((q, qd, qdd)) for q, qd, qdd in of_each)
+    aligned, plain, rate, twice = (gain_of(h, round(fs / f[1])) for h in answers)
     moving = (signals.weight[:, None, some] > 0).astype(np.float64)
     inertia, damping, stiffness = problem.parts[0].linear.at(np.arange(signals.state.q.shape[-1], dtype=np.float64)[some])
 
@@ -142,8 +135,7 @@ def binned(x: Array, y: Array, weight: Array, edges: Array) -> Array:
     edges : Array, shape (bins + 1,)
         Ends of the bins.
     """
-    total, _ = np.histogram(x, edges, weights=weight)
-    summed, _ = np.histogram(x, edges, weights=weight * y)
+    total, summed = (np.histogram(x, edges, weights=each)[0] for each in (weight, weight * y))
     return np.divide(summed, total, out=np.full(len(total), np.nan), where=total > 0)
 
 

@@ -1,5 +1,7 @@
 """Residuals: how sums of them scatter, and errors on stretches of rows, each predicted by a fit of the others."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from idbench.identify.arrays import TINY, Array
@@ -11,16 +13,16 @@ from idbench.identify.rows.factors import CONVERGED
 MEMORY = 3.0  # Time [s] over which residuals are correlated: 0.2 to 3 s on real robots
 
 
-def held_torque(part: LogRows) -> Array:
+def held_torque(parts: Sequence[LogRows]) -> Array:
     """The rows of the torque of parameters that are held, and of laws about their shapes: measured ones less Y, shape (r,)."""
-    to_rows = part.rows.maps[0]
-    return np.asarray(to_rows.measurement(to_rows.signals.torque.mean) - part.rows.Y)
+    each = ((part.rows, part.rows.maps[0]) for part in parts)
+    return np.concatenate([to_rows.measurement(to_rows.signals.torque.mean) - rows.Y for rows, to_rows in each])
 
 
 def torque_squares(problem: Problem) -> Array:
     """Sum of the squares of each joint's measured torque in the explicit rows, shape (joint,)."""
-    rows, held = problem.rows, np.concatenate([held_torque(part) for part in problem.parts])
-    return np.asarray(np.sum(rows.by_kind((rows.Y + held) * rows.valid) ** 2, axis=-1))
+    rows = problem.rows
+    return np.asarray(np.sum(rows.by_kind((rows.Y + held_torque(problem.parts)) * rows.valid) ** 2, axis=-1))
 
 
 def held_out_errors(problem: Problem) -> Array:

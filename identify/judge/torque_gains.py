@@ -48,7 +48,7 @@ class TorqueGains:
     @classmethod
     def of(cls, problem: Problem) -> Self:
         """Gains of all torques that change, beside the explicit model of a problem whose rows are kept."""
-        rows, held = problem.rows, np.concatenate([held_torque(part) for part in problem.parts])
+        rows, held = problem.rows, held_torque(problem.parts)
         whole = np.column_stack([rows.W, held, rows.Y + held]) * rows.valid[:, None]
         p, n = whole.shape[1], problem.basis.n
         factors = np.zeros((n, p, p))
@@ -151,7 +151,7 @@ class TorqueGains:
 
     def _spread(self, X: Array, a: Array) -> Array:
         """How many times that of white ones the variance of sums of the residuals is, shape (joint,)."""
-        rows, held = self.problem.rows, np.concatenate([held_torque(part) for part in self.problem.parts])
+        rows, held = self.problem.rows, held_torque(self.problem.parts)
         rest = rows.Y + held - a[rows.group] * (rows.predicted(X) + held)
         to_rows = rows.maps[0]
         return variance_of_sums(rows.by_kind(rest * rows.valid), to_rows.grid.step / to_rows.signals.fs)
@@ -182,7 +182,7 @@ class TorqueGains:
         for _ in range(ROUNDS):
             weight = self._weights(X, a)
             X = self._least_squares(a, weight)
-            dX, da = self._step(X, a, weight)
+            dX, da = np.split(np.linalg.lstsq(*self._linear(X, a, weight))[0], [len(X)])
             share, after = 1.0, np.inf
             while share > SETTLED and not (after := self._misfit(X + share * dX, a + share * da)) <= misfit:
                 share /= 2
@@ -190,12 +190,6 @@ class TorqueGains:
                 break
             X, a, misfit = X + share * dX, np.where(self.free, a + share * da, a), after
         return X, a
-
-    def _step(self, X: Array, a: Array, weight: Array) -> tuple[Array, Array]:
-        A, y = self._linear(X, a, weight)
-        step = np.asarray(np.linalg.lstsq(A, y)[0])
-        p = len(X)
-        return step[:p], step[p:]
 
     def _linear(self, X: Array, a: Array, weight: Array) -> tuple[Array, Array]:
         """Rows of the step [dX, da], each joint's times its weight: its residual, and the slopes of what is predicted."""

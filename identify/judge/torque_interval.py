@@ -73,9 +73,7 @@ def torque_interval(estimate: Estimate, level: float = LEVEL) -> TorqueInterval 
         Share of torques that the intervals shall contain, between 0 and 1.
     """
     problem = estimate.problem
-    if problem.long or estimate.X.ndim > 1:
-        return None
-    if not (used := UsedRows.of(problem)):
+    if problem.long or estimate.X.ndim > 1 or not (used := UsedRows.of(problem)):
         return None
     stretches = Stretches.of(problem.parts)
     moved = 0.0 if estimate.model_error is None else estimate.model_error.moved

@@ -118,10 +118,8 @@ def validate(held_out: Problem, X: Array, covariance: Array | None = None, noise
         )
     held_out.require_rows("a motion is judged by its rows, and ")
     judged = as_judged(held_out)
-    signals = judged.signals[0]
-    chain = judged.chain
-    basis = judged.basis
-    rows = judged.parts[0].rows
+    signals, rows = judged.signals[0], judged.parts[0].rows
+    chain, basis = judged.chain, judged.basis
     left = instants(signals, basis, ExplicitModel(), chain, X)
     moving = [_Joint.of(rows, X, j) for j in range(basis.n)]
     rest = 1.0 - signals.weight
@@ -137,8 +135,7 @@ def validate(held_out: Problem, X: Array, covariance: Array | None = None, noise
     bound = _bound(chain.operator, signals.fs) / np.sqrt(np.maximum(count, 1))
     given = np.full(basis.n, np.nan) if noise is None else noise
     white = given if signals.log.poses else row_noise(left, signals, chain) * [joint.unmasked for joint in moving]
-    noise = np.fmax(white, given)
-    noise = np.where(np.isfinite(rms), noise, np.nan)
+    noise = np.where(np.isfinite(rms), np.fmax(white, given), np.nan)
     left_open = [joint.open(covariance) for joint in moving]
     still_rms = np.sqrt(np.divide(squares, count_still, out=np.full(basis.n, np.nan), where=count_still > 0))
     return Validation(*map(np.array, (rms, level, R2, still_rms, correlation, bound, count, noise, left_open)))
@@ -193,19 +190,15 @@ class _Joint:
 
     def judged(self) -> tuple[float, float, float, float, int]:
         """Return the rms of residual and torque, R2, correlation, and the number of valid rows."""
-        rho = self.rho[self.valid]
-        y = self.y[self.valid]
-        share = self.share[self.valid]
+        rho, y, share = (x[self.valid] for x in (self.rho, self.y, self.share))
         if not len(rho) or not self.predicted:
             return np.nan, np.nan, np.nan, np.nan, 0
         mean = float(share @ y) / self.rows
         spread = float(np.sum((y - mean * share) ** 2))
         R2 = 1 - float(rho @ rho) / spread if spread > 0 else np.nan
-        return self._rms(rho), self._rms(y) or self._balanced(), R2, self._correlation(), len(rho)
-
-    def _balanced(self) -> float:
-        """Return the rms of the terms of the model, W_i X_i, as if they were independent of each other."""
-        return sqrt(float(np.sum((self.W[self.valid] * self.X) ** 2)) / self.rows)
+        # Of a joint whose torque is 0: that of the terms of the model, W_i X_i, as if they were independent of each other.
+        level = self._rms(y) or self._rms(self.W[self.valid] * self.X)
+        return self._rms(rho), level, R2, self._correlation(), len(rho)
 
     @property
     def rows(self) -> float:

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from itertools import combinations
+from itertools import chain, combinations
 from math import ceil
 
 import numpy as np
@@ -135,10 +135,7 @@ def _likely(problem: Problem) -> Iterator[_Tried]:
 
 
 def _others(problem: Problem) -> Iterator[_Tried]:
-    yield from _in_degrees(problem)
-    yield from _across(problem)
-    yield from _exchanged(problem)
-    yield from _turned(problem)
+    return chain(_in_degrees(problem), _across(problem), _exchanged(problem), _turned(problem))
 
 
 def _worst(problem: Problem) -> float:
@@ -164,8 +161,8 @@ def _gains(problem: Problem) -> Iterator[_Tried]:
         yield _Tried("gain", "torque", None, (), _changed(problem, tau=np.diag(gains[0])), tuple(gains))
 
 
-def _diagonal(n: int, j: int) -> Array:
-    return np.diag(np.where(np.arange(n) == j, -1.0, 1.0))
+def _diagonal(n: int, j: int, by: float = -1.0) -> Array:
+    return np.diag(np.where(np.arange(n) == j, by, 1.0))
 
 
 def _rates(problem: Problem) -> Iterator[_Tried]:
@@ -240,7 +237,7 @@ def _tilt(problem: Problem) -> Array | None:
     """Rotation vector of gravity that the rows show to first order, shape (3,); None where they show none."""
     fit = problem.factors.fit(CONVERGED)
     rows = problem.rows
-    candidate = next((c for c in MistakeRows(problem.parts, problem.basis, fit.X).of_robot(TILT)), None)
+    candidate = next(MistakeRows(problem.parts, problem.basis, fit.X).of_robot(TILT), None)
     if candidate is None:
         return None
     weight = (np.tile(fit.weight, len(rows.time) // rows.kinds) * rows.valid)[:, None]
@@ -274,9 +271,8 @@ def _in_degrees(problem: Problem) -> Iterator[_Tried]:
     if not driven.all():
         return
     yield _Tried("unit", "position", None, (DEGREE,), _changed(problem, q=np.diag(np.where(hinges, DEGREE, 1.0))))
-    for j in np.flatnonzero(hinges) if n > 1 else ():
-        one = np.diag(np.where(np.arange(n) == j, DEGREE, 1.0))
-        yield _Tried("unit", "joint", int(j), (DEGREE,), _changed(problem, q=one))
+    for j in map(int, np.flatnonzero(hinges)) if n > 1 else ():
+        yield _Tried("unit", "joint", j, (DEGREE,), _changed(problem, q=_diagonal(n, j, DEGREE)))
 
 
 def _turned(problem: Problem) -> Iterator[_Tried]:

@@ -62,11 +62,15 @@ class LoadedRobot:
         return BaseParameters.of(self.tree, self.standard + PayloadLink(self.tree, self.tree.n - 1))
 
     @cached_property
+    def payload(self) -> dict[str, Array]:
+        """Base parameters of the payload by name: what its ten standard parameters make of each, shape (10,)."""
+        both, p = self.both, len(self.standard.names)
+        return {name: K[p:] for name, k, K in zip(both.names, both.kept, both.K, strict=True) if k >= p}
+
+    @cached_property
     def names(self) -> tuple[str, ...]:
         """Names of the payload's base parameters that are not known."""
-        p = len(self.standard.names)
-        own = [name for name, k in zip(self.both.names, self.both.kept, strict=True) if k >= p]
-        return tuple(name for name in own if name not in self.known)
+        return tuple(name for name in self.payload if name not in self.known)
 
     @cached_property
     def basis(self) -> Basis:

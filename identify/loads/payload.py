@@ -147,27 +147,17 @@ def difference(robot: LoadedRobot) -> PayloadEstimate:
     return PayloadEstimate(robot.names, factors.fit(1).X, covariance, robot.known)
 
 
-WAYS: Mapping[str, Callable[[LoadedRobot], PayloadEstimate]] = {
-    "together": together,
-    "fixed": fixed,
-    "apart": apart,
-    "difference": difference,
-}
+WAYS: Mapping[str, Callable[[LoadedRobot], PayloadEstimate]] = {f.__name__: f for f in (together, fixed, apart, difference)}
 """The four ways by name, the best first."""
 
 
 def _as_link(robot: LoadedRobot) -> tuple[Array, Array]:
     """Return T, which makes of the payload's free parameters what they add to the robot's, and what known ones add."""
-    p = len(robot.standard.names)
-    own = [robot.standard.names.index(f"{letters}{robot.tree.n}") for letters in INERTIAL]
-    add = robot.robot.K[:, own]  # of ten parameters of the link
-    of_payload_ = [i for i, k in enumerate(robot.both.kept) if k >= p]
-    K = robot.both.K[of_payload_, p:]
-    T = add @ np.linalg.pinv(K)
-    names = [robot.both.names[i] for i in of_payload_]
+    own, names = [robot.standard.names.index(f"{letters}{robot.tree.n}") for letters in INERTIAL], list(robot.payload)
+    # What ten parameters of the link add, by those of the payload.
+    T = robot.robot.K[:, own] @ np.linalg.pinv(np.array(list(robot.payload.values())))
     free = [names.index(name) for name in robot.names]
-    known = T @ np.array([robot.known.get(name, 0.0) for name in names])
-    return T[:, free], known
+    return T[:, free], T @ np.array([robot.known.get(name, 0.0) for name in names])
 
 
 def _outer(lower: Array) -> Array:
@@ -181,5 +171,4 @@ def _root(S: Array, size: float) -> Array:
     values, axes = np.linalg.eigh(S)
     least = max(MIN_EIGENVALUE * values[-1], 1e-9 * size)
     lower = np.linalg.cholesky((axes * np.maximum(values, least)) @ axes.T)
-    found: Array = lower[np.tril_indices(4)]
-    return found
+    return np.asarray(lower[np.tril_indices(4)])
