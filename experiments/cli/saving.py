@@ -19,9 +19,10 @@ Files = Mapping[str, Callable[[Path], object]]
 """What writes the files of an experiment, by their names."""
 
 
-def folder_of(options: Any, out: Path) -> ResultsFolder:
-    """The checked folder of a command's results."""
-    folder = ResultsFolder(out, options.called, command_of(options, absolute=True), options.force, files_of(options))
+def folder_of(options: Any, out: Path, experiment: str = "") -> ResultsFolder:
+    """The checked folder of the results of a command, or of one of its experiments."""
+    command, read = command_of(options, absolute=True), files_of(options)
+    folder = ResultsFolder(out, experiment or options.called, command, options.force, read)
     folder.check()
     return folder
 

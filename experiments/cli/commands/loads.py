@@ -117,12 +117,10 @@ def _compare_ways(page: Page, options: IdentifyPayload) -> None:
 def _try_gains(page: Page, options: IdentifyGains) -> None:
     """Print how well gains of a simulated robot are found."""
     pairs = simulated_pairs(with_own_parts(options))
-    known = {"ML": pairs.truth["ML"]}
+    mass = pairs.truth["ML"]
     with progress_of("gains") as told:
-        score = pairs.gains(known, told)
-    _print_scores(
-        page, {"gains": score}, f"{pairs.scenario.name}: gains from a payload of {known['ML']:g} kg, {pairs.runs} runs"
-    )
+        score = pairs.gains({"ML": mass}, told)
+    _print_scores(page, {"gains": score}, f"{pairs.scenario.name}: gains from a payload of {mass:g} kg, {pairs.runs} runs")
     page.found |= {"path": pairs.scenario.name, **_summary(score)}
 
 
@@ -131,8 +129,7 @@ def _print_scores(page: Page, scores: dict[str, PairScore], title: str) -> None:
     names = next((score.names for score in scores.values() if score.names), ())
     grid = new_table("", [f"{way}\n{what}" for way in scores for what in ("bias", "rms")])
     for i, name in enumerate(names):
-        cells = (f"{x[i]:.2g}" for s in scores.values() if s.names for x in (s.bias, s.rms))
-        grid.add_row(name, *cells)
+        grid.add_row(name, *(f"{x[i]:.2g}" for s in scores.values() if s.names for x in (s.bias, s.rms)))
     grid.add_section()
     grid.add_row("within 2 sigma", *(c for s in scores.values() if s.names for c in ("", f"{100 * s.coverage:.1f} %")))
     grid.add_row("s a run", *(c for s in scores.values() if s.names for c in ("", f"{s.seconds:.2g}")))

@@ -53,10 +53,8 @@ def servo(options: IdentifyServo) -> None:
                 attempts.attempt("--write", lambda: _write_function(page, options, python_file, made))
             if options.watching.rerun and (folder is not None or audience is not None):
                 attempts.recording(lambda: _recorded(made, audience))
-        if folder is not None:
-            page.print(f"written to {folder.out}{options.watching.hint(folder.out)}", soft_wrap=True)
-        else:
-            page.print(NOT_SAVED)
+        where = f"written to {folder.out}{options.watching.hint(folder.out)}" if folder else NOT_SAVED
+        page.print(where, soft_wrap=True)
 
 
 def _identified(page: Page, folder: ResultsFolder | None, options: IdentifyServo) -> ServosFit:
