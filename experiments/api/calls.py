@@ -10,14 +10,7 @@ from idbench.experiments.api.logs import given_log
 from idbench.experiments.api.results import Identification, SimulatedRun
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.friction_laws import AUTO
-from idbench.experiments.identification.job import (
-    chooses_band,
-    fit_of,
-    identified,
-    request_of,
-    robot_of,
-    truth_of,
-)
+from idbench.experiments.identification.job import chooses_band, fit_of, identified, request_of, robot_of, truth_of
 from idbench.experiments.identification.load import judged_on, prepared, with_held_out
 from idbench.experiments.identification.logs import delay_method
 from idbench.experiments.identification.reading import ReadLog, file_of, late, read
@@ -139,8 +132,7 @@ def fit(
     >>> found.parameters["Fs1"].unit, round(found.parameters["Fs1"].value, 4)
     ('N m', 0.5)
     """
-    logs = several(log)
-    held_out = several(validate)
+    logs, held_out = several(log), several(validate)
     model = robot if isinstance(robot, RobotModel) else None
     _require_logs(logs, held_out, keys)
     table = named(keys) | ({} if robot is None or model else {"robot": robot})
@@ -243,10 +235,9 @@ def _require_truth(truth: Mapping[str, float] | None, model: RobotModel) -> None
     if truth is None:
         return
     names = model.basis.names
-    if unknown := [name for name in truth if name not in names]:
-        raise ExperimentError(
-            f"truth: there is no parameter {unknown[0]}{did_you_mean(unknown[0], names)}; there are {', '.join(names)}"
-        )
+    if name := next((name for name in truth if name not in names), None):
+        hint = did_you_mean(name, names)
+        raise ExperimentError(f"truth: there is no parameter {name}{hint}; there are {', '.join(names)}")
     if missing := [name for name in names if name not in truth]:
         raise ExperimentError(f"truth: {', '.join(missing)} is missing: give 0 for what the robot does not have")
 

@@ -109,8 +109,7 @@ class Identification:
         """The parameters by name."""
         found = self.fit.estimates[self.model]
         truth = self.fit.truth or {}
-        units = self.fit.basis.units
-        each = zip(found.names, found.X.tolist(), found.standard_errors.tolist(), units, strict=True)
+        each = zip(found.names, found.X.tolist(), found.standard_errors.tolist(), self.fit.basis.units, strict=True)
         return {name: ParameterEstimate(name, x, sigma, unit, truth.get(name)) for name, x, sigma, unit in each}
 
     @property

@@ -82,11 +82,9 @@ def with_own_parts(asked: Asked) -> Asked:
 
     made: Any = asked
     tables: dict[str, Any] = {"model": MODELS, "chain": CHAINS, "estimator": ESTIMATORS}
-    given = {name: getattr(made, name, None) for name in tables}
-    named: dict[str, Any] = {name: tables[name].load(value) for name, value in given.items() if value}
+    named = {name: table.load(value) for name, table in tables.items() if (value := getattr(made, name, None))}
     laws = replace(made.parameters, friction=_loaded(made.parameters.friction), add=_loaded(made.parameters.add))
-    found: Asked = replace(made, parameters=laws, **named)
-    return found
+    return replace(made, parameters=laws, **named)
 
 
 def _loaded(texts: Sequence[str]) -> tuple[str, ...]:

@@ -4,8 +4,8 @@ import os
 import signal
 import sys
 from _thread import interrupt_main
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from threading import Timer, main_thread
 from types import FrameType
 from typing import Any
@@ -14,26 +14,25 @@ INTERRUPTED = 130  # Exit code after Ctrl-C: 128 + SIGINT
 AGAIN = 0.01  # Time [s] after which an interruption that was lost is repeated
 
 
-@contextmanager
-def importing() -> Iterator[None]:
+def importing() -> AbstractContextManager[None]:
     """Make Ctrl-C leave at once and quietly while modules are loaded: some turn an interruption into an ImportError."""
-    before = signal.signal(signal.SIGINT, _leave)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)
+    return _handling(_leave, "SIGINT")
+
+
+def terminating() -> AbstractContextManager[None]:
+    """Make termination (SIGTERM, SIGHUP) unwind like an error, so that nothing half-written stays behind."""
+    return _handling(_unwind, "SIGTERM", "SIGHUP")
 
 
 @contextmanager
-def terminating() -> Iterator[None]:
-    """Make termination (SIGTERM, SIGHUP) unwind like an error, so that nothing half-written stays behind."""
-    numbers = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
-    before = {number: signal.signal(number, _unwind) for number in numbers}
+def _handling(handler: Callable[[int, FrameType | None], None], *names: str) -> Iterator[None]:
+    """Handle signals, those that this system has, until the end of the block."""
+    before = {number: signal.signal(number, handler) for name in names if (number := getattr(signal, name, None))}
     try:
         yield
     finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+        for number, handled in before.items():
+            signal.signal(number, handled)
 
 
 class TerminatedError(SystemExit):
@@ -55,7 +54,7 @@ def noticing() -> Iterator[Notice]:
         notice.pressed = True
         signal.default_int_handler(number, frame)
 
-    before, hook = signal.signal(signal.SIGINT, interrupt), sys.unraisablehook
+    hook = sys.unraisablehook
 
     def lost(error: Any) -> None:
         # Python ignores what is raised while an object goes, as locks of imports do: the interruption comes again after that.
@@ -64,12 +63,12 @@ def noticing() -> Iterator[Notice]:
         else:
             hook(error)
 
-    sys.unraisablehook = lost
-    try:
-        yield notice
-    finally:
-        sys.unraisablehook = hook
-        signal.signal(signal.SIGINT, before)
+    with _handling(interrupt, "SIGINT"):
+        sys.unraisablehook = lost
+        try:
+            yield notice
+        finally:
+            sys.unraisablehook = hook
 
 
 def _interrupt() -> None:

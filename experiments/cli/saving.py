@@ -5,15 +5,33 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from idbench.experiments.cli.command import command_of
+from idbench.experiments.errors import ExperimentError
+from idbench.experiments.inputs import files_of
 from idbench.experiments.results.attempts import Attempts
 from idbench.experiments.results.folder import ResultsFolder
 from idbench.experiments.results.page import Page
-from idbench.experiments.results.writing import write_summary
+from idbench.experiments.results.writing import Read, require_free, write_summary
 from idbench.sim.scenario.scenario import Scenario
 from idbench.sim.scenario.scenario_file import to_toml
 
 Files = Mapping[str, Callable[[Path], object]]
 """What writes the files of an experiment, by their names."""
+
+
+def folder_of(options: Any, out: Path, experiment: str = "") -> ResultsFolder:
+    """The checked folder of the results of a command, or of one of its experiments."""
+    command, read = command_of(options, absolute=True), files_of(options)
+    folder = ResultsFolder(out, experiment or options.called, command, options.force, read)
+    folder.check()
+    return folder
+
+
+def require_target(option: str, path: Path, ending: str, *, force: bool, read: Read = ()) -> None:
+    """Raise ExperimentError if a further file that is asked for cannot be written there; before the work, not after it."""
+    if path.suffix != ending:
+        raise ExperimentError(f"{option} {path}: its name must end with {ending}")
+    require_free(path, option, force=force, read=read)
 
 
 @contextmanager

@@ -47,8 +47,7 @@ class Example:
     @cached_property
     def run(self) -> Run:
         """A closed loop of the SCARA without noise."""
-        moves = RandomMoves(moves=3, durations=(0.9, 0.9), rest=0.3)
-        return simulate(replace(load("ideal"), trajectory=moves))
+        return simulate(replace(load("ideal"), trajectory=RandomMoves(moves=3, durations=(0.9, 0.9), rest=0.3)))
 
     @property
     def simulation(self) -> Simulation:

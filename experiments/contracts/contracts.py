@@ -13,33 +13,21 @@ from idbench.identify.blame import is_mistake
 from idbench.identify.plugins import Table, did_you_mean
 
 CONTRACTS: Mapping[str, tuple[Clause, ...]] = {
-    "blocks": (
-        identification.block_names_its_parameters,
-        identification.block_keeps_its_identities,
-    ),
+    "blocks": (identification.block_names_its_parameters, identification.block_keeps_its_identities),
     "models": (identification.model_says_a_true_sentence,),
-    "prefilters": (
-        identification.prefilter_keeps_constants,
-        identification.prefilter_has_no_phase,
-    ),
+    "prefilters": (identification.prefilter_keeps_constants, identification.prefilter_has_no_phase),
     "differentiators": (identification.differentiator_knows_a_line,),
     "alignments": (identification.alignment_keeps_constants,),
     "masks": (identification.mask_gives_weights,),
     "operators": (identification.operator_agrees_with_its_step,),
     "chains": (identification.chain_recovers_ideal_data,),
-    "estimators": (
-        identification.estimator_recovers_the_truth,
-        identification.estimator_takes_every_run_by_itself,
-    ),
+    "estimators": (identification.estimator_recovers_the_truth, identification.estimator_takes_every_run_by_itself),
     "trajectories": (simulation.trajectory_rests_at_both_ends,),
     "controllers": (simulation.controller_commands_every_simulation_by_itself,),
     "drives": (simulation.drive_gives_finite_torques,),
     "frictions": (simulation.friction_resists,),
     "encoders": (simulation.encoder_reads_to_a_count,),
-    "excitations": (
-        simulation.excitation_leads_back_to_rest,
-        simulation.excitation_becomes_its_trajectory,
-    ),
+    "excitations": (simulation.excitation_leads_back_to_rest, simulation.excitation_becomes_its_trajectory),
 }
 """Plug-in point -> what its plug-ins are asked, after what every plug-in is."""
 
@@ -54,10 +42,8 @@ def found(name: str) -> tuple[Table[Any], Any]:
     point, _, short = name.rpartition("/")
     there = [table for table in TABLES if short in table and point in ("", table.point)]
     if not there:
-        known = [other for table in TABLES for other in table]
-        raise ExperimentError(
-            f"no plug-in {name!r}{did_you_mean(short, known)}: idbench list has them all, or name MODULE:CLASS"
-        )
+        hint = did_you_mean(short, [other for table in TABLES for other in table])
+        raise ExperimentError(f"no plug-in {name!r}{hint}: idbench list has them all, or name MODULE:CLASS")
     if len(there) > 1:
         raise ExperimentError(f"{name!r} is several plug-ins: {', '.join(f'{table.point}/{short}' for table in there)}")
     return there[0], there[0].create(short)
@@ -79,8 +65,7 @@ def _loaded(name: str) -> tuple[Table[Any], Any]:
 
 def kept(name: str, example: Example) -> Iterator[tuple[str, str]]:
     """Yield what the plug-in of a name is asked, and why it does not keep it; the tests of plug-in packages ask this."""
-    table, plugin = found(name)
-    yield from keeps(table, plugin, example)
+    yield from keeps(*found(name), example)
 
 
 def keeps(table: Table[Any], plugin: Any, example: Example) -> Iterator[tuple[str, str]]:

@@ -134,8 +134,7 @@ def estimator_recovers_the_truth(estimator: AbstractEstimator, example: Example)
     of_rows = estimator.filtered and estimator.needs <= {"factors", "rows"}
     log = example.log if of_rows else example.run.alone()
     problem = Problem((log,), scara(), ExplicitModel(), idbench_chain(), example.simulation)
-    X = estimator.fit(problem).X
-    require_equal(X, example.truth, "the estimate", rtol=1e-5 if of_rows else 1e-2)
+    require_equal(estimator.fit(problem).X, example.truth, "the estimate", rtol=1e-5 if of_rows else 1e-2)
 
 
 def estimator_takes_every_run_by_itself(estimator: AbstractEstimator, example: Example) -> None:
@@ -143,8 +142,7 @@ def estimator_takes_every_run_by_itself(estimator: AbstractEstimator, example: E
     log = example.run.alone()
     q = np.stack([log.q, np.zeros_like(log.q), log.q])
     tau = np.stack([log.tau, log.tau, log.tau * 1.01])
-    batch = MotionLog(log.fs, q, tau, log.torque)
-    alone = MotionLog(log.fs, q[2], tau[2], log.torque)
+    batch, alone = (MotionLog(log.fs, q[k], tau[k], log.torque) for k in (slice(None), 2))
     found, one = (
         identify(each, scara(), ExplicitModel(), estimator=estimator, simulation=example.simulation, throw=False)
         for each in (batch, alone)

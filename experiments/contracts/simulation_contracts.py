@@ -76,8 +76,7 @@ def excitation_becomes_its_trajectory(excitation: Any, _: Example) -> None:
     planned = excitation.trajectory(c, np.array([0.1, -0.2]), T, 1).motion(robot)
     rest = (planned.duration - T) / 2
     require(rest >= 0, f"it lasts {planned.duration:g} s, less than the {T:g} s that it was given")
-    q = planned.at(rest + t, FS).q
-    require_equal(q, shapes.at(c)[0] + [0.1, -0.2], "a position", atol=1e-9)
+    require_equal(planned.at(rest + t, FS).q, shapes.at(c)[0] + [0.1, -0.2], "a position", atol=1e-9)
 
 
 def trajectory_rests_at_both_ends(trajectory: Any, example: Example) -> None:

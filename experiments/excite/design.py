@@ -76,11 +76,8 @@ class Design:
 
     def __post_init__(self) -> None:
         names = self.robot_model.basis.names
-        for name in self.weights:
-            if name not in names:
-                raise ExperimentError(
-                    f"--weigh {name}: no such parameter{did_you_mean(name, names)}; known: {', '.join(names)}"
-                )
+        if name := next((name for name in self.weights if name not in names), None):
+            raise ExperimentError(f"--weigh {name}: no such parameter{did_you_mean(name, names)}; known: {', '.join(names)}")
         if self.weights and self.criterion != SIGMA:
             raise ExperimentError(f"--weigh needs the criterion sigma, not {self.criterion}")
         if self.criterion not in (known := (SIGMA, *CRITERIA)):
@@ -121,16 +118,12 @@ class Design:
         for pair in found.left_out:
             if thing := next((name for name in wanted if name in pair), None):
                 (other,) = set(pair) - {thing}
-                raise ExperimentError(
-                    f"{thing}: {other} is inside it, or nearer than {1000 * self.asked.clearance:.0f} mm, whatever the "
-                    "posture: move it, or make it smaller"
-                )
+                where = f"inside it, or nearer than {1000 * self.asked.clearance:.0f} mm, whatever the posture"
+                raise ExperimentError(f"{thing}: {other} is {where}: move it, or make it smaller")
         self._require_reachable(found)
         if touch := found.nearest(self.home[None], 0 * self.home[None], FS):
-            raise ExperimentError(
-                f"home = {np.round(self.home, 3).tolist()}: {touch}; give another home, or a smaller clearance, in a file of "
-                "--limits"
-            )
+            way_out = "give another home, or a smaller clearance, in a file of --limits"
+            raise ExperimentError(f"home = {np.round(self.home, 3).tolist()}: {touch}; {way_out}")
         return found
 
     def _require_reachable(self, found: Clearance) -> None:
@@ -150,10 +143,8 @@ class Design:
         """Raise ExperimentError if limits are broken where the arm comes from, at rest."""
         q = np.repeat(self.home[None], 2, axis=0)
         if broken := next(self.use_of(Reference(FS, q, 0 * q, 0 * q)).broken(), None):
-            what = broken.partition(" at ")[0]
-            raise ExperimentError(
-                f"at home, at rest, {what}: give another home, or a larger torque_share, in a file of --limits"
-            )
+            what = f"at home, at rest, {broken.partition(' at ')[0]}"
+            raise ExperimentError(f"{what}: give another home, or a larger torque_share, in a file of --limits")
 
     @cached_property
     def X(self) -> Array:
@@ -213,9 +204,7 @@ class Design:
 
     def _information(self, rate: float, noise: bool) -> Information:
         """Return the information of motions, with their noise, or as if all rows were alike."""
-        basis = self.robot_model.basis
-        fs = self.scenario.fs
-        n = self.robot_model.robot.n
+        basis, n, fs = self.robot_model.basis, self.robot_model.robot.n, self.scenario.fs
         levels = self.levels if noise else NoiseLevels(np.ones(n), np.zeros(n))
         q, qd, qdd = random_states(self.robot_model.tree, POSTURES)
         inertia = np.asarray(slopes(basis, self.X, q, qd, qdd, qd).inertia.mean(axis=-1))  # M(q), on average over postures
@@ -245,8 +234,8 @@ class Design:
         share = np.sqrt(fs / self.scenario.fs)
         levels = NoiseLevels(self.levels.torque * share, self.levels.position * share)
         for i in range(0, len(each), TOGETHER):
-            planned = [self.trajectory(c, 1).motion(self.robot_model.robot).sample(fs).q for c in each[i : i + TOGETHER]]
-            q = np.stack(planned)
+            some = each[i : i + TOGETHER]
+            q = np.stack([self.trajectory(c, 1).motion(self.robot_model.robot).sample(fs).q for c in some])
             log = MotionLog(fs, q, np.zeros_like(q), self.scenario.channel)
             found.append(predicted_information(log, self.robot_model.basis, self.X, levels, CHAINS.create("idbench")))
         return self.known + self.repeat * np.concatenate(found)
@@ -254,8 +243,7 @@ class Design:
     def random_motions(self) -> tuple[list[Array], int]:
         """Return coefficients of random motions that keep the limits, and how many were drawn."""
         rng = np.random.default_rng([self.seed, 1])
-        kept = list[Array]()
-        drawn = 0
+        kept, drawn = list[Array](), 0
         while len(kept) < RANDOM and drawn < DRAWS:
             c, drawn = self.excitation.random(rng, self.plan, self.duration, self.frequency), drawn + 1
             if self.plan.excess(c) == 0:
@@ -284,8 +272,7 @@ class Design:
         """Use of the limits by a motion that is sampled at FS."""
         robot = self.robot_model.robot
         limits = self.limits
-        jerk = np.gradient(motion.qdd, 1 / FS, axis=0)
-        rates = {"velocity": motion.qd, "acceleration": motion.qdd, "jerk": jerk}
+        rates = {"velocity": motion.qd, "acceleration": motion.qdd, "jerk": np.gradient(motion.qdd, 1 / FS, axis=0)}
         shares = {"position": np.abs(motion.q - limits.middle) / limits.sizes[0]}
         shares |= {name: np.abs(x) / getattr(limits, name) for name, x in rates.items()}
         tau = inverse_dynamics(robot, motion.q, motion.qd, motion.qdd) + coulomb_torque(robot, motion.qd)
@@ -295,8 +282,7 @@ class Design:
         squares = np.mean(tau[moves] ** 2, axis=0, keepdims=True) if moves.any() else 0 * tau[:1]
         shares["rms torque"] = np.sqrt(squares) / limits.rms_torque
         limited = {name: share for name, share in shares.items() if share.any()}
-        touch = self.clearance.nearest(motion.q, motion.qd, FS)
-        return LimitUse(limited, touch, self.asked.clearance, robot.joints)
+        return LimitUse(limited, self.clearance.nearest(motion.q, motion.qd, FS), self.asked.clearance, robot.joints)
 
     def _spread(self, motion: Reference) -> Array:
         """Return the torques that all parameters make together if none were opposed, shape (time, joint) [N m]."""

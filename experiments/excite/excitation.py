@@ -16,6 +16,7 @@ from idbench.sim.trajectories.trajectory import AbstractTrajectory
 
 FEWEST = 3  # Moves that lead back
 REST = 1.0  # Time at rest before and after a motion [s]: as much as filters look to either side
+WAY_OUT = "give a longer --duration or a higher --frequency"  # Where a motion would have too few shapes
 
 
 class AbstractExcitation(ABC):
@@ -49,9 +50,7 @@ class FourierExcitation(AbstractExcitation):
         """Return a constant and harmonics up to the frequency."""
         harmonics = int(frequency * duration + 1e-9)
         if harmonics < 2:
-            raise ExperimentError(
-                f"{duration:g} s have no two harmonics up to {frequency:g} Hz: give a longer --duration or a higher --frequency"
-            )
+            raise ExperimentError(f"{duration:g} s have no two harmonics up to {frequency:g} Hz: {WAY_OUT}")
         return Shapes.fourier(t, duration, harmonics)
 
     def random(self, rng: np.random.Generator, plan: Plan, duration: float, frequency: float) -> Array:
@@ -110,16 +109,13 @@ class MovesExcitation(AbstractExcitation):
         return Quintic(points, (duration / len(c),) * (repeat * len(c)), REST)
 
     def _greedy(self, plan: Plan, duration: float, frequency: float) -> Greedy:
-        T = duration / self.count(duration, frequency)
-        return Greedy(plan.information, plan.limits, T, plan.known)
+        return Greedy(plan.information, plan.limits, duration / self.count(duration, frequency), plan.known)
 
     def count(self, duration: float, frequency: float) -> int:
         """Return the number of moves; raise ExperimentError if there are too few to lead back."""
         count = round(duration * frequency)
         if count < FEWEST:
-            raise ExperimentError(
-                f"{duration:g} s are no three moves, {frequency:g} a second: give a longer --duration or a higher --frequency"
-            )
+            raise ExperimentError(f"{duration:g} s are no three moves, {frequency:g} a second: {WAY_OUT}")
         return count
 
 
@@ -130,8 +126,5 @@ def _rows(x: Array) -> tuple[tuple[float, ...], ...]:
 EXCITATIONS: PluginTable[AbstractExcitation] = PluginTable(
     "excitations",
     AbstractExcitation,  # type: ignore[type-abstract]  # only asked whether an instance is one
-    {
-        "fourier": FourierExcitation,
-        "moves": MovesExcitation,
-    },
+    {"fourier": FourierExcitation, "moves": MovesExcitation},
 )

@@ -113,8 +113,7 @@ class Excited:
         if search.interrupted:
             sys.stderr.write("\nidbench: stopping: the best motion so far is judged and written; Ctrl-C again drops it\n")
         found = cls(design, search.best, random, drawn, search.interrupted)
-        names = ("on the way from home", "on the way back")
-        ways = zip(names, map(design.use_of, found.ways), strict=True)
+        ways = zip(("on the way from home", "on the way back"), map(design.use_of, found.ways), strict=True)
         if broken := [*found.use.broken(), *(f"{name}, {what}" for name, use in ways for what in use.broken())]:
             more = f", and {len(broken) - 1} more" if len(broken) > 1 else ""
             raise ExperimentError(
@@ -123,10 +122,8 @@ class Excited:
             )
         if not np.isfinite(found.sigma).all():
             lost = [name for name, s in zip(design.robot_model.basis.names, found.sigma, strict=True) if not np.isfinite(s)]
-            raise ExperimentError(
-                f"the motion does not excite {', '.join(lost)}: give a longer --duration, wider limits, or leave them out: "
-                f"--without {' '.join(lost)}"
-            )
+            way_out = f"give a longer --duration, wider limits, or leave them out: --without {' '.join(lost)}"
+            raise ExperimentError(f"the motion does not excite {', '.join(lost)}: {way_out}")
         return found
 
     @cached_property
@@ -206,30 +203,20 @@ class Excited:
     @property
     def binding(self) -> list[str]:
         """Active limits, in words."""
-        joints = self.use.joints
-        found = []
+        joints, found = self.use.joints, []
         for name, largest in self.use.largest.items():
-            near = [joint for joint, share in zip(joints, largest, strict=True) if share > BINDING]
-            if near:
+            if near := [joint for joint, share in zip(joints, largest, strict=True) if share > BINDING]:
                 found.append(f"{name} of {'all joints' if len(near) == len(joints) else ', '.join(near)}")
         return found
 
     @cached_property
     def scenario(self) -> Scenario:
         """What simulates it."""
-        d = self.design
-        name = f"{Path(d.robot).stem}-excited"
-        origin = (
-            f"idbench excite {Path(d.robot).name}, {d.kind}, {d.duration:g} s, {d.frequency:g} Hz, {d.criterion}, seed {d.seed}"
-        )
-        return replace(
-            d.scenario,
-            name=name,
-            origin=origin,
-            robot=absolute(d.robot),
-            trajectory=d.trajectory(self.c),
-            start=(),
-        )
+        d, file = self.design, Path(self.design.robot)
+        asked = f"{d.kind}, {d.duration:g} s, {d.frequency:g} Hz, {d.criterion}, seed {d.seed}"
+        name, origin = f"{file.stem}-excited", f"idbench excite {file.name}, {asked}"
+        robot, trajectory = absolute(d.robot), d.trajectory(self.c)
+        return replace(d.scenario, name=name, origin=origin, robot=robot, trajectory=trajectory, start=())
 
     def planned(self, fs: float) -> tuple[Array, Reference]:
         """Return the part of each sample (0 there, 1 motion, 2 back), and the whole way of the arm, from home to home."""
@@ -243,16 +230,11 @@ class Excited:
         d, names = self.design, self.design.robot_model.basis.names
         median, best = self.ratios
         table = {"sigma": self.sigma, "random_median": self.median, "random_best": self.best}
-        if self.earlier is not None:
-            table["earlier"] = self.earlier
+        table |= {} if self.earlier is None else {"earlier": self.earlier}
         return {
             "experiment": "excite",
             "robot": absolute(d.robot),
-            "kind": d.kind,
-            "criterion": d.criterion,
-            "duration": d.duration,
-            "frequency": d.frequency,
-            "repeat": d.repeat,
+            **{name: getattr(d, name) for name in ("kind", "criterion", "duration", "frequency", "repeat")},
             "rest": REST,
             "seed": d.seed,
             "earlier_logs": len(d.logs),
@@ -285,13 +267,11 @@ class Excited:
         clearance = self.design.clearance
         pairs = "; ".join(" and ".join(pair) for pair in clearance.left_out)
         if not clearance.checks and pairs:
-            return (
-                f"all shapes are too near whatever the posture, and were left out: nothing was checked for collisions: {pairs}"
-            )
+            why = "all shapes are too near whatever the posture, and were left out"
+            return f"{why}: nothing was checked for collisions: {pairs}"
         if not clearance.checks:
             return "nothing is known of the robot's shapes: whether it hits itself or the floor was not checked"
         found = [f"left out, since they are too near whatever the posture: {pairs}"] if pairs else []
-        found += [f"not checked, since they have no shape that MuJoCo can measure: {', '.join(clearance.bare)}"] * bool(
-            clearance.bare
-        )
+        if bare := ", ".join(clearance.bare):
+            found.append(f"not checked, since they have no shape that MuJoCo can measure: {bare}")
         return "; ".join(found)

@@ -36,10 +36,10 @@ def excited(asked: ExciteRequest, progress: Callable[[float], None]) -> tuple[Ex
 
     ExperimentError, IdentificationError or BenchError if something is wrong with the request, or no motion keeps the limits.
     """
-    design, share = designed(asked), _percent(asked.until)
-    if not share:
+    design = designed(asked)
+    if asked.until is None:
         return Excited.of(design, progress), None
-    sequence = MotionSequence.of(design, share, progress)
+    sequence = MotionSequence.of(design, _percent(asked.until), progress)
     return sequence.rounds[-1].excited, sequence
 
 
@@ -62,11 +62,9 @@ def designed(asked: ExciteRequest) -> Design:
     robot_model, limits = RobotModel(absolute(asked.robot), asked.parameters), _limits(asked)
     limits_of(robot_model.robot, limits)  # what is missing is said before the parameters are grouped
     robot_model.require_linear()
-    if len(asked.torque_noise) not in (0, 1, robot_model.robot.n):
-        count = len(asked.torque_noise)
-        raise ExperimentError(
-            f"--torque-noise has {count} values for {robot_model.robot.n} joints: give one for all, or one per joint"
-        )
+    n, count = robot_model.robot.n, len(asked.torque_noise)
+    if count not in (0, 1, n):
+        raise ExperimentError(f"--torque-noise has {count} values for {n} joints: give one for all, or one per joint")
     return Design(
         robot=absolute(asked.robot),
         scenario=scenario,
@@ -133,10 +131,8 @@ def _weights(given: tuple[str, ...]) -> Mapping[str, float]:
     return found
 
 
-def _percent(text: str | None) -> float | None:
+def _percent(text: str) -> float:
     """Return a share given in percent."""
-    if text is None:
-        return None
     share = (number_of(text.removesuffix("%")) or 0.0) / 100
     if not 0 < share < 1:
         raise ExperimentError(f"--until {text}: give a share between 0 and 100 %, such as 0.1%")

@@ -1,6 +1,5 @@
 """Motions one after the other, each designed for what the logs before it left open, on the simulated robot."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -54,21 +53,19 @@ class MotionSequence:
 
         After ROUNDS motions, or Ctrl-C, it ends with what there is.
         """
-        rounds = list[Round]()
+        rounds, weights = list[Round](), design.weights
         logs, model = design.logs, design.robot_model
-        weights = design.weights
         try:
             for number in range(ROUNDS):
-                asked = replace(design, logs=logs, seed=design.seed + number, weights=weights)
-                excited = Excited.of(asked, progress)
-                run = simulate(replace(excited.scenario, seed=design.scenario.seed + number))
-                logs = (*logs, run.alone())
+                excited = Excited.of(replace(design, logs=logs, seed=design.seed + number, weights=weights), progress)
+                logs = (*logs, simulate(replace(excited.scenario, seed=design.scenario.seed + number)).alone())
                 estimate = identify(logs, model.basis, ExplicitModel())
                 shares = brisk_shares(model.tree, model.basis, estimate.X, estimate.standard_errors)
                 rounds.append(Round(excited, logs[-1], estimate, shares))
                 if rounds[-1].share < wished or excited.interrupted:
                     break
-                weights = _weak(rounds[-1], wished, design.weights)
+                each = zip(model.basis.names, shares, strict=True)  # what is not known well enough counts as much more
+                weights = {name: float(design.weights.get(name, 1.0) * max(ENOUGH, x / wished)) for name, x in each}
         except KeyboardInterrupt:
             if not rounds:
                 raise
@@ -88,10 +85,3 @@ class MotionSequence:
 def _summary(found: Round) -> dict[str, Any]:
     X, sigma = found.estimate.X.tolist(), found.estimate.standard_errors.tolist()
     return {"brisk_share": found.share, "weakest": found.weakest, "estimate": X, "sigma": sigma}
-
-
-def _weak(last: Round, wished: float, weights: Mapping[str, float]) -> dict[str, float]:
-    """Return weights for the next motion: what is not known well enough counts as much more as it is off."""
-    names = last.excited.design.robot_model.basis.names
-    each = zip(names, last.shares, strict=True)
-    return {name: float(weights.get(name, 1.0) * max(ENOUGH, share / wished)) for name, share in each}

@@ -104,13 +104,10 @@ class Servos:
     @cached_property
     def joints(self) -> Joints:
         """The joints with their logs."""
-        names = self.links.joints
-        logs = [
-            JointsLog(
-                self.name(path), columns, tuple(self.known.servo(joint, path.name) for joint in names), self.links_of(path)
-            )
-            for path, columns in self.logs.items()
-        ]
+        logs = list[JointsLog]()
+        for path, columns in self.logs.items():
+            servos = tuple(self.known.servo(joint, path.name) for joint in self.links.joints)
+            logs.append(JointsLog(self.name(path), columns, servos, self.links_of(path)))
         return Joints(self.links, tuple(logs))
 
     def name(self, path: Path) -> str:

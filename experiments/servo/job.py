@@ -114,9 +114,7 @@ class ServosFit:
             **({"laws": laws} if laws else {}),
             "joints": {joint: summary_of(fit) for joint, fit in self.fits.items()},
             "lack_of_fit": {j: {"friction": fit.friction, "residuals": lacks[j]} for j, fit in self.fits.items()},
-            "diagnosis": [
-                suspect_summary(mistake, [joint], mistake.unit, remedy_of(mistake)) for joint, mistake in self.mistakes.items()
-            ],
+            "diagnosis": [suspect_summary(x, [joint], x.unit, remedy_of(x)) for joint, x in self.mistakes.items()],
         }
 
     def summary(self) -> dict[str, Any]:
@@ -125,9 +123,11 @@ class ServosFit:
         return self.parameters() | {"position_error": each, "verdict": [line for _, line in self.verdicts]}
 
 
-def servos_identified(
-    asked: ServoRequest, heard: Callable[[str, Identified | str, ServosFit], None] | None = None
-) -> ServosFit:
+Heard = Callable[[str, Identified | str, ServosFit], None]
+"""Receives a joint, its result, and all results so far."""
+
+
+def servos_identified(asked: ServoRequest, heard: Heard | None = None) -> ServosFit:
     """Servos of a robot, identified joint by joint; `heard` is called with each result, and with all results so far.
 
     Raises

@@ -227,11 +227,10 @@ class Joints:
     def _together(self, before: Mapping[int, ServoFit], fits: Mapping[int, ServoFit]) -> dict[int, ServoFit]:
         """Fits whose offsets agree, of some whose loads assume the offsets of the fits before."""
         joints = {j: OffsetJoint(fit, {}) for j, fit in fits.items()}
-        times = [log.columns.t for log in self.logs]
-        moving = [
-            {j: m._replace(t=t, q=np.interp(t, m.t, m.q)) for j, m in each.items()}
-            for each, t in zip(self._moving(before, self.runs_with(before)), times, strict=True)
-        ]
+        moving = list[dict[int, Moving]]()
+        for log, each in zip(self.logs, self._moving(before, self.runs_with(before)), strict=True):
+            t = log.columns.t
+            moving.append({j: m._replace(t=t, q=np.interp(t, m.t, m.q)) for j, m in each.items()})
         assumed = {k: fit.offset for k, fit in before.items() if k in fits and fit.scaled}
         now = self._loaded(moving)
         for k, offset in assumed.items():
@@ -264,12 +263,12 @@ class Joints:
 
     def _run(self, log: JointsLog, j: int, load: JointLoad) -> ServoRun:
         columns, name = log.columns, f"{log.name}, {self.links.joints[j]}"
-        on = None if columns.on is None else columns.on[:, j] > 0.5
-        voltage = None if columns.voltage is None else columns.voltage[:, j]
-        forward = None if columns.forward is None else columns.forward[:, j]
+        others = columns.on, columns.voltage, columns.forward
+        on, voltage, forward = (None if x is None else x[:, j] for x in others)
         low, high = self.links.ranges[j]
         measured = columns.t, columns.q[:, j], columns.command[:, j]
-        return ServoRun(*measured, load, log.servos[j], on, voltage, forward, (low, high), name=name)
+        enabled = None if on is None else on > 0.5
+        return ServoRun(*measured, load, log.servos[j], enabled, voltage, forward, (low, high), name=name)
 
 
 def _apart(one: Sequence[Mapping[int, Moving]], other: Sequence[Mapping[int, Moving]]) -> float:

@@ -25,15 +25,9 @@ def servo_function(robot: str, fits: Mapping[str, tuple[Servo, ServoFit]], logs:
     text = files("idbench.experiments.exports").joinpath("servo.py.txt").read_text(encoding="utf-8")
     every = {joint: _parameters(servo, fit) for joint, (servo, fit) in fits.items()}
     table = pformat(every, width=110, sort_dicts=False).replace("inf", 'float("inf")')
-    words = {
-        "{friction}": _friction_lines(),
-        "{name}": robot,
-        "{version}": version("idbench"),
-        "{logs}": ", ".join(logs),
-        "{servos}": table,
-    }
-    for mark, word in words.items():
-        text = text.replace(mark, word)
+    words = {"friction": _friction_lines(), "name": robot, "version": version("idbench"), "logs": ", ".join(logs)}
+    for mark, word in {**words, "servos": table}.items():
+        text = text.replace(f"{{{mark}}}", word)
     return text
 
 
@@ -47,10 +41,9 @@ def _friction_lines() -> str:
 
 
 def _parameters(servo: Servo, fit: ServoFit) -> dict[str, float]:
-    known = {"gain": servo.slope, "kd": servo.kd, "supply": servo.supply, "limit": servo.limit, "counts": servo.counts}
-    known |= {"speed_limit": servo.speed_limit}
+    known = {name: getattr(servo, name) for name in ("kd", "supply", "limit", "counts", "speed_limit")}
     law = ServoLaw(**fit.p)._asdict()
-    return {**known, **{name: float(law[name]) for name in SERVO_PARAMETERS if name != "backlash"}}
+    return {"gain": servo.slope, **known, **{name: float(law[name]) for name in SERVO_PARAMETERS if name != "backlash"}}
 
 
 EXPRESSIBLE = ("a", "b", "Ia", "Fs", "Fv", "offset", "lag", "lead", "delay", "rate", "backlash")
@@ -78,8 +71,8 @@ def inexpressible(fits: Mapping[str, ServoFit]) -> list[str]:
 
 def without_servo(joints: Sequence[str], fits: Mapping[str, ServoFit]) -> list[str]:
     """Joints of a written file without a servo."""
-    lost = [joint for joint in joints if joint not in fits]
-    return [f"{', '.join(lost)}: no servo is written; what the robot's file has there stays"] if lost else []
+    lost = ", ".join(joint for joint in joints if joint not in fits)
+    return [f"{lost}: no servo is written; what the robot's file has there stays"] if lost else []
 
 
 def values_of(parameters: Mapping[str, float], servo: Servo) -> ServoValues:

@@ -25,11 +25,7 @@ CONFOUNDED = 0.9
 """Correlation from which on two parameters are hardly told apart: the error of each is then 2.3 times what it is with the other
 known."""
 
-LAWS = {
-    "duty": "a V duty - b qd",
-    "torque": "a sat(kp (u - q) - kd qd)",
-    "current": "a sat(kp (u - q) - kd qd), of a current",
-}
+LAWS = {"duty": "a V duty - b qd", "torque": "a sat(kp (u - q) - kd qd)", "current": "a sat(kp (u - q) - kd qd), of a current"}
 """The law of each kind of loop, in words."""
 
 MISTAKEN: Mapping[str, str] = {
@@ -135,8 +131,7 @@ def verdict_lines(
     All by joint: mean errors of positions in the fitted and in the held-out logs [rad], shape (log,), rms of the motion of the
     held-out logs about its mean [rad], and what was proved to be wrong.
     """
-    lines = []
-    word_of = dict[str, str]()
+    lines, word_of = list[tuple[str, str]](), dict[str, str]()
     for joint, fit in fits.items():
         word, why = _holds(fit, fitted[joint], held_out.get(joint), moved.get(joint, 0.0), joint in mistakes)
         lines.append((joint, f"{word}: {why}" if joint in held_out else why))
@@ -192,8 +187,7 @@ def _lacks(fit: ServoFit) -> str:
 
 def choice_table(joint: str, choice: ServoFrictionChoice) -> Listing:
     """Table of laws of friction compared by parts of the log that their fits did not see."""
-    first = next(iter(choice.errors))
-    rows = []
+    first, rows = next(iter(choice.errors)), []
     for law, error in choice.errors.items():
         name = f"{law} (chosen)" if law == choice.chosen else law
         rows.append((name, number(1e3 * error), f"{choice.p[law]:.2g}" if law in choice.p else ""))

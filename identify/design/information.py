@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import product
 
 import numpy as np
 import numpy.typing as npt
@@ -125,9 +126,8 @@ class Information:
         n = self.basis.n
         steps = np.array([STEP, STEP, 1.0])
         copies = np.broadcast_to(motion, (3 * n + 1, *motion.shape)).copy()
-        for order in range(3):
-            for j in range(n):
-                copies[1 + order * n + j, order, :, j] += steps[order]
+        for order, j in product(range(3), range(n)):
+            copies[1 + order * n + j, order, :, j] += steps[order]
         weight = self.weight(motion)
         sums = np.zeros((3 * n + 1, motion.shape[-2]))
         weighted = np.zeros(motion.shape[-2:])

@@ -51,13 +51,11 @@ class Greedy:
         half = np.diff(self.limits.position, axis=1)[:, 0] / 2
         low = np.maximum(np.maximum(at - reach, -half), -left * reach)
         high = np.minimum(np.minimum(at + reach, half), left * reach)
-        low = np.minimum(low, high)
-        return rng.uniform(low, high, (count, len(at)))
+        return rng.uniform(np.minimum(low, high), high, (count, len(at)))
 
     def _matrices(self, at: Array, pool: Array) -> Array:
         """Return the information of moves, shape (move, p, p)."""
-        u = (np.arange(INSTANTS) + 0.5) / INSTANTS
-        shape = quintic(u) / self.T ** np.arange(4)[:, None]
+        shape = quintic((np.arange(INSTANTS) + 0.5) / INSTANTS) / self.T ** np.arange(4)[:, None]
         motion = (pool - at)[:, None, None, :] * shape[:, :, None]
         motion[:, 0] += self.limits.middle + at
         information = replace(self.information, rate=INSTANTS / self.T)
@@ -75,9 +73,7 @@ class DesignSearch:
 
     def __init__(self, starts: Sequence[Array], steps: int, progress: Callable[[float], None] | None = None) -> None:
         self.found, self.interrupted = list(starts), False
-        self._steps = steps
-        self._done = 0
-        self._progress = progress
+        self._steps, self._done, self._progress = steps, 0, progress
 
     @property
     def best(self) -> Array:
@@ -98,9 +94,7 @@ class DesignSearch:
 
     def _descend(self, plan: Plan, end: "_End", rounds: int) -> None:
         """Descend from an end, which is kept up to date."""
-        shape = end.c.shape
-        before = self._done
-        steps = 0
+        shape, before, steps = end.c.shape, self._done, 0
 
         def value(flat: Array) -> tuple[float, Array]:
             cost, slope = plan.value(flat.reshape(shape))

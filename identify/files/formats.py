@@ -51,10 +51,10 @@ def read_bag(path: Path) -> LogTable:
         raise LogError(f"cannot read the log {path} as a ROS bag: {str(error).splitlines()[0]}") from error
     tables = {topic: messages for (of, topic), messages in every.items() if of == kind}
     others = [messages for (of, _), messages in every.items() if of != kind and messages]
-    several = len(tables) > 1
-    found = [KINDS[kind](path, messages, f"{topic}/" if several else "") for topic, messages in tables.items() if messages]
+    several, full = len(tables) > 1, {topic: messages for topic, messages in tables.items() if messages}
+    found = [KINDS[kind](path, messages, f"{topic}/" if several else "") for topic, messages in full.items()]
     if len(found) == 1 and len(others) == 1:
-        found.append(_commands(path, next(messages for messages in tables.values() if messages), others[0]))
+        found.append(_commands(path, next(iter(full.values())), others[0]))
     return LogTable(
         {name: column for columns, _ in found for name, column in columns.items()},
         entries={name: joints for _, entries in found for name, joints in entries.items()},
@@ -64,18 +64,15 @@ def read_bag(path: Path) -> LogTable:
 def _of_states(path: Path, messages: Sequence[tuple[int, Any]], before: str) -> Columns:
     """Return columns of joint states."""
     joints = _same_joints(path, [message.name for _, message in messages])
-    samples = [message for _, message in messages]
-    values = {name: [getattr(message, name) for message in samples] for name in ("position", "velocity", "effort")}
+    values = {name: [getattr(message, name) for _, message in messages] for name in ("position", "velocity", "effort")}
     return _columns(before, joints, _stamps(messages), values)
 
 
 def _of_trajectories(path: Path, messages: Sequence[tuple[int, Any]], before: str) -> Columns:
     """Return columns of the points of joint trajectories, one message after the other."""
     joints = _same_joints(path, [message.joint_names for _, message in messages])
-    points = [
-        (start, point) for start, (_, message) in zip(_stamps(messages), messages, strict=True) for point in message.points
-    ]
-    t = np.array([start + _seconds(point.time_from_start) for start, point in points])
+    points = [(x, point) for x, (_, message) in zip(_stamps(messages), messages, strict=True) for point in message.points]
+    t = np.array([x + _seconds(point.time_from_start) for x, point in points])
     fields = {"position": "positions", "velocity": "velocities", "effort": "effort"}
     values = {name: [getattr(point, field) for _, point in points] for name, field in fields.items()}
     return _columns(before, joints, t, values)
@@ -208,12 +205,9 @@ TEXT = (".csv", ".txt", ".tsv", ".dat")  # What names of text files end with
 FORMATS: dict[str, Callable[[Path], LogTable]] = {
     **dict.fromkeys(TEXT, read_text),
     ".parquet": read_parquet,
-    ".npz": read_numpy,
-    ".npy": read_numpy,
+    **dict.fromkeys((".npz", ".npy"), read_numpy),
     ".mat": read_matlab,
-    ".bag": read_bag,
-    ".db3": read_bag,
-    ".mcap": read_bag,
+    **dict.fromkeys((".bag", ".db3", ".mcap"), read_bag),
 }
 """Readers by what a file's name ends with, `.gz` aside."""
 

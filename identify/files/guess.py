@@ -8,7 +8,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from idbench.identify.arrays import Array
 from idbench.identify.errors import LogError
 from idbench.identify.files.formats import read_table
 from idbench.identify.files.guess_units import with_units
@@ -77,16 +76,11 @@ def guess(path: Path, table: LogTable | None = None) -> Guess:
         raise LogError(f"{path} has {table.rows} rows: too few to say what its columns are")
     found = _by_names(table) if table.named else _by_values(path, table)
     missing = [name for name in ("q", "tau") if not getattr(found, name).columns]
-    if missing == ["q"] and found.qd.columns:
-        missing = []  # velocities alone: they are integrated
-    if missing:
+    if missing and not (missing == ["q"] and found.qd.columns):  # velocities alone: they are integrated
         what = " and ".join({"q": "positions", "tau": "torques or currents"}[name] for name in missing)
-        raise UnknownColumnsError(
-            f"nothing in {path} looks like {what}; its columns: {', '.join(list(table.columns)[:40])}; say what they are in a "
-            "log.toml",
-            found,
-            tuple(table.columns),
-        )
+        columns = tuple(table.columns)
+        said = f"nothing in {path} looks like {what}; its columns: {', '.join(columns[:40])}; say what they are in a log.toml"
+        raise UnknownColumnsError(said, found, columns)
     episodes, doubts = _episodes(table)
     doubts += _alike(table, found)
     layout, more = with_units(replace(found, rows=episodes), table)
@@ -129,9 +123,8 @@ def _alike(table: LogTable, found: LogLayout) -> list[str]:
 
 def _by_names(table: LogTable) -> LogLayout:
     """Return a layout by what columns are called."""
-    groups = _groups(table)
+    groups, places = _groups(table), list[str]()
     found, n = LogLayout(q=Source(), tau=Source()), 0
-    places = list[str]()
     for kind in ("t", "q", "tau", "qd"):
         choices = {stem: names for (k, stem), names in groups.items() if k == kind}
         if kind == "t":
@@ -178,16 +171,14 @@ def _groups(table: LogTable) -> dict[tuple[str, str], list[tuple[str, str]]]:
 
     Where one joint has a name without a number (elbow), those of others (wrist_1) are names, too.
     """
-    parsed = [
-        found for name, column in table.columns.items() if (found := _parsed(name)) and (column.ndim == 1 or found.kind != "t")
-    ]
+    every = table.columns.items()
+    parsed = [found for name, x in every if (found := _parsed(name)) and (x.ndim == 1 or found.kind != "t")]
     named = {(found.kind, found.word) for found in parsed if found.place and not found.number}
     groups: dict[tuple[str, str], list[tuple[str, str]]] = {}
     for found in parsed:
         by_name = (found.kind, found.word) in named
         stem = found.word if by_name or not found.number else f"{found.word} {found.rest}"
-        place = found.place if by_name else found.number
-        groups.setdefault((found.kind, stem), []).append((found.name, place))
+        groups.setdefault((found.kind, stem), []).append((found.name, found.place if by_name else found.number))
     return groups
 
 
@@ -198,8 +189,7 @@ def _parsed(name: str) -> _Name | None:
     if set(tokens) & set(OTHERS.split()):
         return None
     for kind, words in WORDS.items():
-        hits = [token for token in tokens if token in words.split()]
-        if hits:
+        if hits := [token for token in tokens if token in words.split()]:
             number = next((token for token in reversed(tokens) if token.isdigit()), "")
             rest = [token for token in tokens if token not in hits and not token.isdigit()]
             place = re.sub(rf"(?i)^[\W_]*{hits[0]}[\W_]+|[\W_]+{hits[0]}[\W_]*$", "", bare)
@@ -223,8 +213,7 @@ def _sorted(names: list[tuple[str, str]], joints: tuple[str, ...]) -> list[tuple
 def _by_values(path: Path, table: LogTable) -> LogLayout:
     """Return a layout of columns that have no names: time first if it increases, then as many of each quantity."""
     names = list(table.columns)
-    first = table.columns[names[0]]
-    timed = bool(np.mean(np.diff(first) > 0) > 0.9)  # stamps may repeat
+    timed = bool(np.mean(np.diff(table.columns[names[0]]) > 0) > 0.9)  # stamps may repeat
     rest = names[1:] if timed else names
     t = Source((names[0],)) if timed else Source(fs=0.0)
     for count in (count for count in MOST_BLOCKS if len(rest) % count == 0):
@@ -244,14 +233,11 @@ def _is_derivative(table: LogTable, q: tuple[str, ...], qd: tuple[str, ...]) -> 
     slopes, fits = list[float](), list[bool]()
     for a, b in zip(q, qd, strict=True):
         width = max(1, min(len(table.columns[a]) // 50, 25))
-        v, given = (_smooth(x, width) for x in (np.gradient(table.columns[a]), table.columns[b]))
+        window, both = np.ones(width) / width, (np.gradient(table.columns[a]), table.columns[b])
+        v, given = (np.convolve(np.nan_to_num(x), window, mode="valid") for x in both)
         if not np.any(v) or not np.any(given):
             continue
         slope = float(v @ given / (v @ v))
         slopes.append(slope)
         fits.append(float(np.linalg.norm(given - slope * v)) < 2 * ALIKE * float(np.linalg.norm(given)))
     return bool(fits) and 2 * sum(fits) > len(fits) and min(slopes) > 0
-
-
-def _smooth(x: Array, width: int) -> Array:
-    return np.convolve(np.nan_to_num(x), np.ones(width) / width, mode="valid")

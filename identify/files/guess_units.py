@@ -40,7 +40,11 @@ def _suspected(quantity: str, layout: LogLayout, table: LogTable) -> str:
         return unit_of_times(table.columns[layout.t.columns[0]])
     if quantity == "q":
         return "deg" if _largest(table, layout.q) > FARTHEST else ""
-    return _torque_unit(table, layout.tau) if quantity == "tau" else _velocity_unit(table, layout)
+    if quantity == "qd":
+        return _velocity_unit(table, layout)
+    if any(word in re.findall("[a-z]+", name.lower()) for name in layout.tau.logged for word in CURRENTS):
+        return "mA" if _largest(table, layout.tau) > STRONGEST / 10 else "A"
+    return "mN m" if _largest(table, layout.tau) > STRONGEST else ""
 
 
 def _values(table: LogTable, source: Source) -> Array:
@@ -57,12 +61,6 @@ def unit_of_times(t: Array) -> str:
     """Return the unit that times look like by their steps; empty for s."""
     step = float(np.nanmedian(np.diff(t)))
     return next((unit for unit, largest in (("", 0.5), ("ms", 200.0), ("us", 2e5)) if step < largest), "ns")
-
-
-def _torque_unit(table: LogTable, source: Source) -> str:
-    if any(word in re.findall("[a-z]+", name.lower()) for name in source.logged for word in CURRENTS):
-        return "mA" if _largest(table, source) > STRONGEST / 10 else "A"
-    return "mN m" if _largest(table, source) > STRONGEST else ""
 
 
 def _velocity_unit(table: LogTable, layout: LogLayout) -> str:

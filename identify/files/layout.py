@@ -85,12 +85,10 @@ class LogLayout:
     @classmethod
     def beside(cls, log: Path) -> tuple[Self, Path] | None:
         """Return the layout that stands beside a log, under its name or as log.toml, and its path; None if there is none."""
-        stem = log.with_suffix("") if log.suffix.lower() == ".gz" else log
-        for path in (stem.with_suffix(".toml"), log.parent / LAYOUT):
+        for path in (own_layout(log), log.parent / LAYOUT):
             if path.is_dir() and path.name == LAYOUT:
-                raise LogError(
-                    f"{path} is a folder, where a file says what the columns of logs are: rename it, or put them elsewhere"
-                )
+                what = "a folder, where a file says what the columns of logs are"
+                raise LogError(f"{path} is {what}: rename it, or put them elsewhere")
             if path.is_file() and path != log and (path.name == LAYOUT or _is_layout(path)):
                 return cls.read(path), path
         return None
@@ -104,8 +102,7 @@ class LogLayout:
     def read(cls, path: Path) -> Self:
         """Return the layout of a file; raise LogError that names what is unknown or wrong in it."""
         try:
-            stated = tomllib.loads(path.read_text(encoding="utf-8"))
-            return cls._of(stated)
+            return cls._of(tomllib.loads(path.read_text(encoding="utf-8")))
         except OSError as error:
             raise LogError(f"cannot read {path}: {error.strerror or error}") from error
         except (ValueError, TypeError, RecursionError) as error:  # ours are ValueErrors, too
@@ -142,8 +139,7 @@ class LogLayout:
 
     def where(self, quantity: str, source: Source) -> Self:
         """Return the layout with another source of a quantity: t, q, qd or tau."""
-        changed: Any = {quantity: source}
-        return replace(self, **changed)
+        return replace(self, **{quantity: source})  # type: ignore[arg-type]  # of one of these names
 
     def words(self, path: Path) -> str:
         """Sentence on where each quantity and its unit are from."""
@@ -180,6 +176,11 @@ class LogLayout:
         return "\n".join(lines).strip() + "\n"
 
 
+def own_layout(log: Path) -> Path:
+    """Path of the file that says what one log alone holds, whether it is there or not."""
+    return (log.with_suffix("") if log.suffix.lower() == ".gz" else log).with_suffix(".toml")
+
+
 def matching(pattern: str, names: Sequence[str]) -> list[tuple[str, str]]:
     """Return the names that a pattern with a * stands for, and what is in its place: by number, or in the order of the file."""
     before, _, after = pattern.partition("*")
@@ -209,14 +210,9 @@ def _source(name: str, stated: Any, file: str) -> Source:
         raise LogError(f"{name} = {stated!r} must name columns, or be a table [{name}]")
     _require_known(name, stated, tuple(f.name for f in fields(Source)))
     columns = stated.get("columns", [])
-    unit, fs = stated.get("unit", ""), stated.get("fs")
-    found = Source(
-        tuple(map(str, [columns] if isinstance(columns, (str, int)) else columns)),
-        str(unit),
-        str(stated.get("file", file)),
-        str(stated.get("t", "")),
-        None if fs is None else float(fs),
-    )
+    names = tuple(map(str, [columns] if isinstance(columns, (str, int)) else columns))
+    unit, file, t = str(stated.get("unit", "")), str(stated.get("file", file)), str(stated.get("t", ""))
+    found = Source(names, unit, file, t, None if (fs := stated.get("fs")) is None else float(fs))
     if found.fs is not None and not SLOWEST <= found.fs <= FASTEST:
         raise LogError(f"[{name}]: fs = {found.fs:g} must be between {SLOWEST:g} and {FASTEST:g} Hz: samples a second")
     try:

@@ -94,10 +94,7 @@ def read_log(path: Path | str, torque: TorqueChannel | None = None, joints: Sequ
     found = found.ordered(joints) if joints else found
     if found.t_tau is not None:
         raise LogError(f"{path} has torques at times of their own: idbench.read_log(..., resample=True) puts them on one clock")
-    channel = torque or found.torque
-    if channel is None:
-        raise LogError(
-            f"{path} does not say what its torque means: instantaneous, held or averaged, and with what "
-            "delay; say it with torque=TorqueChannel(...)"
-        )
+    if (channel := torque or found.torque) is None:
+        lacks = "does not say what its torque means: instantaneous, held or averaged, and with what delay"
+        raise LogError(f"{path} {lacks}; say it with torque=TorqueChannel(...)")
     return MotionLog.at_times(found.t, found.q, found.tau, channel, found.conditions, found.missing)

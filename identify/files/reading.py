@@ -177,8 +177,7 @@ class LogFiles:
         tau = np.where(np.isin(np.arange(tau.shape[1]), missing), 0.0, tau)
         channel = layout.torque or self._stated()
         gain = np.broadcast_to(self._gain(tau.shape[1]), tau.shape[1:])
-        tau = tau * gain
-        q, tau, qd = self._of_joints(q, tau, qd)
+        q, tau, qd = self._of_joints(q, tau * gain, qd)
         warm = self.of("temperature", layout.temperature)[0] if layout.temperature.columns else None
         gains = tuple(map(float, gain))
         own_times = t_tau - start if other else None
@@ -236,8 +235,7 @@ class LogFiles:
     def _stated(self) -> TorqueChannel | None:
         """Statements of the file about its torques."""
         path = self._path(self.layout.tau)
-        stated = self._table(path).torque
-        if stated is None:
+        if (stated := self._table(path).torque) is None:
             return None
         try:
             known = json.loads(stated)
@@ -269,10 +267,8 @@ class LogFiles:
 
     def of(self, quantity: str, source: Source) -> tuple[Array, tuple[str, ...]]:
         """Return the columns of a quantity in SI, shape (time, joint), and the names of joints that they have."""
-        path = self._path(source)
+        path, columns, joints = self._path(source), list[Array](), list[str]()
         table = self._table(path)
-        columns = list[Array]()
-        joints = list[str]()
         for pattern in source.columns:
             if pattern == UNLOGGED:
                 columns.append(np.full(table.rows, np.nan))

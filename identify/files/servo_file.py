@@ -22,6 +22,7 @@ KEYS = ("model", "gain_unit", *(field.name for field in fields(Servo) if field.n
 """What a servo may state."""
 
 WORDS = ("model", "gain_unit", "kind")  # Of these, what is no number
+MODELS = f"published: {', '.join(PUBLISHED)}"  # What may be stated as a model, in words
 COUNTS = 4096  # Counts of a servo's encoder that are assumed where neither they nor a model are stated, as of most
 
 MAX_OVER_SUPPLY = 1.5
@@ -83,7 +84,7 @@ class ServoFile:
             stated = _of_model(model, stated)
         if kind == Servo.kind:
             if "gain" not in stated:
-                raise SettingError(f"gain is missing: the duty per unit of kp and rad, or a model that has it; {_published()}")
+                raise SettingError(f"gain is missing: the duty per unit of kp and rad, or a model that has it; {MODELS}")
             stated = {"counts": COUNTS, **stated}
         elif "kp" not in stated and "kd" not in stated:
             raise SettingError(f"kp is missing: the gain of a loop of kind {kind!r}, by its unit of command per rad")
@@ -99,9 +100,8 @@ class ServoFile:
     def require(self, joints: Sequence[str], logs: Sequence[str]) -> None:
         """Raise SettingError if something is stated of a joint or a log that is not there."""
         if wrong := [name for name in self.joints if name not in joints]:
-            raise SettingError(
-                f"[joints.{wrong[0]}]: the robot has no such joint{did_you_mean(wrong[0], joints)}; it has {', '.join(joints)}"
-            )
+            what = f"the robot has no such joint{did_you_mean(wrong[0], joints)}"
+            raise SettingError(f"[joints.{wrong[0]}]: {what}; it has {', '.join(joints)}")
         wrong = [pattern for pattern in self.logs if not any(fnmatchcase(log, pattern) for log in logs)]
         some = len(wrong) < len(self.logs)  # then a pattern without a log is of one that is not given here
         if wrong := [pattern for pattern in wrong if not (some and set(pattern) & set("*?["))]:
@@ -120,7 +120,7 @@ class ServoFile:
 def _of_model(model: Any, stated: Mapping[str, Any]) -> dict[str, Any]:
     """Statements, completed by the published data of a model."""
     if model not in PUBLISHED:
-        raise SettingError(f"model = {model!r} is unknown{did_you_mean(str(model), PUBLISHED)}; {_published()}")
+        raise SettingError(f"model = {model!r} is unknown{did_you_mean(str(model), PUBLISHED)}; {MODELS}")
     known = PUBLISHED[model]
     supply = stated.get("supply", 0.0)
     if supply > MAX_OVER_SUPPLY * known.supply:
@@ -137,14 +137,9 @@ def _require_names(logs: Mapping[str, Mapping[str, Any]]) -> None:
 def _require_known(part: Mapping[str, Any]) -> None:
     for key, value in part.items():
         if key not in KEYS:
-            raise IdentificationError(
-                f"key {key!r} is unknown{did_you_mean(key, KEYS)}; known: {', '.join(KEYS)}, joints, logs"
-            )
+            known = ", ".join((*KEYS, "joints", "logs"))
+            raise IdentificationError(f"key {key!r} is unknown{did_you_mean(key, KEYS)}; known: {known}")
         if key not in WORDS and (isinstance(value, bool) or not isinstance(value, int | float)):
             raise IdentificationError(f"{key} = {value!r} must be a number")
         if key == "counts" and int(value) != value:
             raise IdentificationError(f"counts = {value!r} must be a whole number: those of the encoder in a turn")
-
-
-def _published() -> str:
-    return f"published: {', '.join(PUBLISHED)}"

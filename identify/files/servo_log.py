@@ -182,8 +182,6 @@ def _order(columns: ServoColumns, joints: Sequence[str], path: Path) -> list[int
             raise LogError(f"{path} names the joints {', '.join(columns.joints)}; the robot's {', '.join(missing)} is missing")
         return [columns.joints.index(joint) for joint in joints]
     if columns.q.shape[1] != len(joints):
-        raise LogError(
-            f"{path}: number of positions {columns.q.shape[1]}, joints of the robot {len(joints)}: {', '.join(joints)}; --lock "
-            "NAME=VALUE holds those that the log does not have"
-        )
+        numbers = f"number of positions {columns.q.shape[1]}, joints of the robot {len(joints)}: {', '.join(joints)}"
+        raise LogError(f"{path}: {numbers}; --lock NAME=VALUE holds those that the log does not have")
     return list(range(len(joints)))

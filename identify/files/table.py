@@ -16,18 +16,7 @@ POSITIONS = {"rad": 1.0, "deg": np.pi / 180, "mrad": 1e-3, "rev": 2 * np.pi, "m"
 """Units of positions in rad and m, by name."""
 
 VELOCITIES = {f"{unit}/s": size for unit, size in POSITIONS.items()} | {"rpm": 2 * np.pi / 60}  # [rad/s, m/s]
-TORQUES = {
-    "N m": 1.0,
-    "mN m": 1e-3,
-    "kN m": 1e3,
-    "N cm": 1e-2,
-    "N": 1.0,
-    "kN": 1e3,
-    "A": 1.0,
-    "mA": 1e-3,
-    "%": 1e-2,
-    "1": 1.0,
-}
+TORQUES = {"N m": 1.0, "mN m": 1e-3, "kN m": 1e3, "N cm": 1e-2, "N": 1.0, "kN": 1e3, "A": 1.0, "mA": 1e-3, "%": 1e-2, "1": 1.0}
 """Those that are no torques need a gain beside them."""
 
 UNITS: Mapping[str, Mapping[str, float]] = {
@@ -51,11 +40,9 @@ NEED_GAIN = ("A", "mA", "%")  # Units of efforts that a gain makes torques [N m]
 
 def factor(quantity: str, unit: str) -> float:
     """Factor from values in a unit to SI; raise SettingError if it is none of this quantity."""
-    known = UNITS[quantity]
-    plain = _plain(unit)
-    for name, size in known.items():
-        if _plain(name) == plain:
-            return size
+    known, plain = UNITS[quantity], _plain(unit)
+    if name := next((name for name in known if _plain(name) == plain), None):
+        return known[name]
     raise SettingError(f"unit {unit!r} of {quantity} is unknown; known: {', '.join(known)}")
 
 
@@ -85,9 +72,8 @@ COPIES = 3  # How often the values of a log are in memory at once while it is re
 def require_room(path: Path, what: str, size: int) -> None:
     """Raise LogError if the values of a file, of so many bytes, are more than this process can hold."""
     if (needed := 1e-9 * COPIES * size) > (room := memory()):
-        raise LogError(
-            f"{path} says that it holds {what}: reading them takes {needed:.3g} GB, and there are {room:.3g} GB: cut the log"
-        )
+        takes = f"reading them takes {needed:.3g} GB, and there are {room:.3g} GB"
+        raise LogError(f"{path} says that it holds {what}: {takes}: cut the log")
 
 
 def memory() -> float:

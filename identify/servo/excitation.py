@@ -48,15 +48,13 @@ class Excitation:
                 f"{runs[0].name}: the joint does not move (by {np.rad2deg(max(ranges)):.2g} deg): log motions of a good part "
                 "of its range, with steps and reversals"
             )
+        name = runs[0].name
         if not any(run.enabled.any() for run in runs):
-            raise ExcitationError(
-                f"{runs[0].name}: torque is off all the time: friction and armature may swing, a and b need torque"
-            )
+            raise ExcitationError(f"{name}: torque is off all the time: friction and armature may swing, a and b need torque")
         if wrong := [run for run in runs if np.ptp(run.command) > DEGREES * max(ranges)]:
-            run = wrong[0]
+            spans = f"the command spans {np.ptp(wrong[0].command):.4g}, the position {np.ptp(wrong[0].clean):.4g} rad"
             raise IdentificationError(
-                f"{run.name}: the command spans {np.ptp(run.command):.4g}, the position {np.ptp(run.clean):.4g} rad: is the "
-                "command in degrees or counts? State its unit: --units command=deg"
+                f"{wrong[0].name}: {spans}: is the command in degrees or counts? State its unit: --units command=deg"
             )
         if all(_saturated(run) for run in runs):
             raise ExcitationError(
@@ -74,8 +72,7 @@ class Excitation:
         commanded = [run.servo.slope * float(np.sqrt(np.mean((run.command - run.clean) ** 2))) for run in runs]
         driven = max(run.servo.supply * min(run.servo.limit, x) for run, x in zip(runs, commanded, strict=True))
         torque = max(torque, TYPICAL * held.get("a", 0.0) * driven, held.get("b", 0.0) * speed, held.get("Fs", 0.0))
-        if loaded := torque > 0:
-            loaded = torque > NOTHING * driven or any(name in held for name in SCALES)
+        loaded = torque > 0 and (torque > NOTHING * driven or any(name in held for name in SCALES))
         if not loaded:  # ratios show, of torques that are then those of a = 1
             torque = TYPICAL * driven
         off = any((~run.enabled).any() and np.ptp(run.clean[~run.enabled]) > 20 * run.step for run in runs)
@@ -85,14 +82,8 @@ class Excitation:
     @property
     def scales(self) -> dict[str, float]:
         """Typical sizes, by what `ServoParameter.of` names."""
-        return {
-            "torque": self.torque,
-            "torque per speed": self.torque / self.speed,
-            "angle": self.step,
-            "time": self.T,
-            "1": 1.0,
-            "speed": self.speed,
-        }
+        rates = {"speed": self.speed, "torque per speed": self.torque / self.speed}
+        return {"torque": self.torque, "angle": self.step, "time": self.T, "1": 1.0, **rates}
 
 
 def _saturated(run: ServoRun) -> bool:

@@ -63,9 +63,8 @@ class ServoFit:
     @cached_property
     def left_out(self) -> LeftOut:
         """The fit without each run, or piece of a run."""
-        return cross_validate(
-            self.found, self.loop, 3 * self.scale, stretches(self.found, self.loop, CLUSTERS * len(self.free))
-        )
+        parts = stretches(self.found, self.loop, CLUSTERS * len(self.free))
+        return cross_validate(self.found, self.loop, 3 * self.scale, parts)
 
     @property
     def scaled(self) -> bool:
@@ -164,12 +163,9 @@ class ServoFit:
             if begin.per_angle[-1] > 0:
                 other[1:] = run.still, (begin.state[0] - run.command[0]) / begin.per_angle[-1]
         apart = np.abs(loop.simulate(self.p)[0] - loop.simulate(self.p, ahead)[0])
-        return [self._after(one[: len(run.t)] > run.still) for one, run in zip(apart, runs, strict=True)]
-
-    @staticmethod
-    def _after(apart: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
-        last = int(np.flatnonzero(apart)[-1]) + 1 if apart.any() else 0
-        return np.arange(len(apart)) >= (last if last <= len(apart) // 2 else 0)
+        moved = [one[: len(run.t)] > run.still for one, run in zip(apart, runs, strict=True)]
+        ends = [int(np.flatnonzero(x)[-1]) + 1 if x.any() else 0 for x in moved]
+        return [np.arange(len(x)) >= (end if end <= len(x) // 2 else 0) for x, end in zip(moved, ends, strict=True)]
 
 
 TORQUES = ("a", "b", "Ia", "Fs", "Fv", "Fst", "Fo")  # Parameters that scale together where no known load sets the scale
@@ -188,11 +184,9 @@ UNEXPLAINED = 0.2  # Typical residual, as a share of the range of the motion, fr
 def require_possible(held: Mapping[str, float]) -> None:
     """Raise SettingError if a value cannot be."""
     for name, x in held.items():
-        parameter = SERVO_PARAMETERS[name]
-        if not np.isfinite(x) or not parameter.low <= x <= parameter.high or (parameter.relative and x <= 0):
-            limits = ["finite", "above 0"] if parameter.relative else ["finite"]
-            limits += [f"at least {parameter.low:.4g}"] if np.isfinite(parameter.low) and not parameter.relative else []
-            limits += [f"at most {parameter.high:.4g}"] if np.isfinite(parameter.high) else []
-            raise SettingError(
-                f"{name} = {x:g} {parameter.unit} is impossible: {parameter.meaning} must be {', '.join(limits)}"
-            )
+        of = SERVO_PARAMETERS[name]
+        if not np.isfinite(x) or not of.low <= x <= of.high or (of.relative and x <= 0):
+            limits = ["finite", "above 0"] if of.relative else ["finite"]
+            limits += [f"at least {of.low:.4g}"] if np.isfinite(of.low) and not of.relative else []
+            limits += [f"at most {of.high:.4g}"] if np.isfinite(of.high) else []
+            raise SettingError(f"{name} = {x:g} {of.unit} is impossible: {of.meaning} must be {', '.join(limits)}")

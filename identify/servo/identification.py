@@ -54,18 +54,17 @@ def together(joints: Mapping[int, OffsetJoint], assumed: Mapping[int, float]) ->
     """
     sources = [k for k in assumed if k in joints and "offset" in joints[k].fit.free]
     own = {k: joints[k].fit.free.index("offset") for k in sources}
-    B = {j: np.stack([_of(joint, k) for k in sources], axis=-1) for j, joint in joints.items()} if sources else {}
-    A = np.array([B[k][own[k]] for k in sources]).reshape(len(sources), len(sources))
-    coupled = np.eye(len(sources)) - A
-    if not sources or np.linalg.cond(coupled) > INSEPARABLE:
-        return {j: joint.fit for j, joint in joints.items()}
+    as_they_are = {j: joint.fit for j, joint in joints.items()}
+    if not sources:
+        return as_they_are
+    none = {j: np.zeros(len(fit.free)) for j, fit in as_they_are.items()}
+    B = {j: np.stack([of.per_offset.get(k, none[j]) for k in sources], axis=-1) for j, of in joints.items()}
+    coupled = np.eye(len(sources)) - np.array([B[k][own[k]] for k in sources])
+    if np.linalg.cond(coupled) > INSEPARABLE:
+        return as_they_are
     agreed = np.linalg.inv(coupled)
     ahead = agreed @ np.array([joints[k].fit.p["offset"] - assumed[k] for k in sources])
     return {j: _moved(joint.fit, B[j] @ ahead, _covariance(j, joints, B[j] @ agreed, own)) for j, joint in joints.items()}
-
-
-def _of(joint: OffsetJoint, k: int) -> Array:
-    return joint.per_offset.get(k, np.zeros(len(joint.fit.free)))
 
 
 def _covariance(j: int, joints: Mapping[int, OffsetJoint], per_error: Array, own: Mapping[int, int]) -> Array:
@@ -86,10 +85,7 @@ def _moved(fit: ServoFit, by: Array, covariance: Array) -> ServoFit:
 
 
 def identify_servo(
-    runs: Sequence[ServoRun],
-    friction: str = "load",
-    more: Sequence[str] = (),
-    held: dict[str, float] | None = None,
+    runs: Sequence[ServoRun], friction: str = "load", more: Sequence[str] = (), held: dict[str, float] | None = None
 ) -> ServoFit:
     """Parameters of a servo, from commands and positions alone.
 

@@ -115,10 +115,8 @@ class Servo:
         finite = {name: x for name, x in above.items() if not (name in ("limit", "speed_limit") and x == np.inf)}
         require_positive(**{KINDS[self.kind].limit if name == "limit" else name: x for name, x in finite.items()})
         if not (np.isfinite(self.kd) and min(self.kp, self.time_constant) >= 0 and max(self.kp, self.time_constant) < np.inf):
-            raise SettingError(
-                f"kp = {self.kp:g}, time_constant = {self.time_constant:g}, kd = {self.kd:g}: all must be finite, and only kd "
-                "may be negative"
-            )
+            stated = f"kp = {self.kp:g}, time_constant = {self.time_constant:g}, kd = {self.kd:g}"
+            raise SettingError(f"{stated}: all must be finite, and only kd may be negative")
         if not self.kp and not self.kd:
             raise SettingError("kp or kd must be above 0: a loop without gains does not respond to its command")
         if self.kind == "duty" and not self.limit <= 1:

@@ -84,8 +84,7 @@ def _solved(scores: Array, curvatures: Array) -> tuple[Array, Array]:
 
 def _summed(x: Array, parts: int) -> Array:
     """Sums over parts of each run, shape (cluster, ...)."""
-    split = np.array_split(x, parts, axis=1)
-    return np.concatenate([part.sum(axis=1) for part in split])
+    return np.concatenate([part.sum(axis=1) for part in np.array_split(x, parts, axis=1)])
 
 
 def stretches(found: Found, loop: ServoLoop, clusters: int) -> int:

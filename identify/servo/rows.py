@@ -85,10 +85,8 @@ class ServoRows:
         """Residual and parameters for each delay, targets keeping within a rate [rad/s]."""
         driven = np.concatenate([run.driven(rate) for run in self._runs])
         motion, Y = (np.concatenate(x) for x in zip(*[run.motion for run in self._runs], strict=True))
-        found = []
-        for k, delay in enumerate(DELAYS.tolist()):
-            W = np.concatenate([driven[:, k, :1], motion, driven[:, k, 1:]], axis=1)
-            found.append(self._solved(W, Y, delay, rate))
+        every = (np.concatenate([driven[:, k, :1], motion, driven[:, k, 1:]], axis=1) for k in range(len(DELAYS)))
+        found = (self._solved(W, Y, delay, rate) for W, delay in zip(every, DELAYS.tolist(), strict=True))
         return [pair for pair in found if pair]
 
     def _solved(self, W: Array, Y: Array, delay: float, rate: float) -> tuple[float, dict[str, float]] | None:
@@ -126,8 +124,7 @@ class _Uniform:
         inertia, sine, cosine, rest, *_ = run.load.over(self._t)
         self.inertia = float(inertia.mean())
         needed = inertia * qdd + sine * np.sin(self.q) + cosine * np.cos(self.q) + rest
-        columns = np.stack([-self._on * qd, -qdd, -np.sign(qd), needed], axis=1)
-        filtered = low_passed(columns)[::DECIMATION]
+        filtered = low_passed(np.stack([-self._on * qd, -qdd, -np.sign(qd), needed], axis=1))[::DECIMATION]
         self.motion = filtered[:, :-1], filtered[:, -1]
 
     def driven(self, rate: float) -> Array:

@@ -6,6 +6,7 @@ steps mislead, wide ones, and samples spread as the normal equations say, go on.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import Self
 
 import numpy as np
@@ -79,9 +80,8 @@ class ServoSearch:
     def cost(self, q: Array, ahead: Array | float = 0.0) -> Array:
         """Objective of simulated positions, shape (lane,), of runs that begin ahead, shape (lane, run, 3)."""
         r = np.abs(self.loop.q - q) * self.loop.kept / self.c
-        total = 2 * self.c**2 * (r - np.log1p(r)).sum(axis=(1, 2)) + self._certainty * (
-            np.square(ahead).sum(axis=(-2, -1)) if np.ndim(ahead) else 0.0
-        )
+        away = np.square(ahead).sum(axis=(-2, -1)) if np.ndim(ahead) else 0.0
+        total = 2 * self.c**2 * (r - np.log1p(r)).sum(axis=(1, 2)) + self._certainty * away
         return np.nan_to_num(total, nan=np.inf, posinf=np.inf)
 
     def best(self, start: Mapping[str, float], rounds: int) -> Found:
@@ -91,10 +91,7 @@ class ServoSearch:
         several mu, and samples about the step, are simulated at once, and the best of all is x(k+1).
         """
         x, ahead = np.array([start[name] for name in self.free]), np.zeros((len(self.loop.runs), STATES))
-        width = 1.0
-        damping = 1e-2
-        idle = 0
-        spread = 1.0
+        width, damping, spread, idle = 1.0, 1e-2, 1.0, 0
         rng = np.random.default_rng(0)  # the same samples for everybody
         for _ in range(rounds):
             tried, cost, J, r, beginnings = self._differences(start, x, ahead, width)
@@ -126,8 +123,7 @@ class ServoSearch:
         return self._found(found.p, found.ahead, 0.5)
 
     def _found(self, p: dict[str, float], ahead: Array, width: float) -> Found:
-        x = np.array([p[name] for name in self.free])
-        _, cost, J, r, beginnings = self._differences(p, x, ahead, width)
+        _, cost, J, r, beginnings = self._differences(p, np.array([p[name] for name in self.free]), ahead, width)
         return Found(p, float(cost[0]), r, J, ahead, beginnings)
 
     def axis_points(self, found: Found) -> list[dict[str, float]]:
@@ -138,12 +134,8 @@ class ServoSearch:
         seen = values > UNSEEN  # along others, nothing changes however far one goes
         values, axes = values[seen][:WORST], axes[:, seen]
         size = np.sqrt(found.cost / values)
-        steps = [
-            sign * np.sqrt(rise) * size[k] * axes[:, k] / normal.size
-            for k in range(len(size))
-            for rise in RISES
-            for sign in (1, -1)
-        ]
+        ways = product(range(len(size)), RISES, (1, -1))
+        steps = [sign * np.sqrt(rise) * size[k] * axes[:, k] / normal.size for k, rise, sign in ways]
         tried = self._within(x, np.array(steps or [0 * x]))  # where nothing has an effect, there is no other place
         return [{**found.p, **dict(zip(self.free, one.tolist(), strict=True))} for one in tried]
 

@@ -122,11 +122,7 @@ class Stages:
 
     @one_thread()
     def fit_fine(
-        self,
-        friction: str,
-        free: Sequence[str],
-        p: Mapping[str, float],
-        contrasts: tuple[float, float] | None = None,
+        self, friction: str, free: Sequence[str], p: Mapping[str, float], contrasts: tuple[float, float] | None = None
     ) -> ServoFit:
         """Fit of all runs in fine steps.
 
@@ -270,8 +266,7 @@ def _best_start(runs: Sequence[ServoRun], held: Mapping[str, float], excitation:
     if not starts:
         return {}, np.inf
     loop = ServoLoop(runs, runs[0].servo.steps.step or max(COARSE * excitation.T, 2 * STEP))
-    lanes = {name: np.array([p[name] for p in starts]) for name in starts[0]}
-    q = loop.simulate(lanes)
+    q = loop.simulate({name: np.array([p[name] for p in starts]) for name in starts[0]})
     best = int(ServoSearch(loop, (), excitation.scales, excitation.range / 10).cost(q).argmin())
     return dict(starts[best]), float(np.abs(loop.q - q[best])[loop.kept].mean()) / excitation.range
 

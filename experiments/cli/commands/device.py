@@ -3,10 +3,11 @@
 from rich.text import Text
 
 from idbench.experiments.cli.options.tools import ShowDevice
+from idbench.experiments.cli.saving import require_target
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.robot_model import absolute
 from idbench.experiments.results.page import Page
-from idbench.experiments.results.writing import require_free, write_text
+from idbench.experiments.results.writing import write_text
 from idbench.experiments.servo.device import BENCH, device_of, devices, mjcf_of_device, servo_toml_of
 from idbench.experiments.servo.servo_files import cannot_express
 from idbench.experiments.text import new_table, print_titled
@@ -19,9 +20,7 @@ def device(options: ShowDevice) -> None:
     page = Page(machine=options.json)
     for option, path, ending in (("--write-mjcf", options.write_mjcf, ".xml"), ("--write", options.write, ".toml")):
         if path is not None:
-            if path.suffix != ending:
-                raise ExperimentError(f"{option} {path}: its name must end with {ending}")
-            require_free(path, option, force=options.force)
+            require_target(option, path, ending, force=options.force)
     if not options.name:
         page.found |= {"devices": list(devices())}
         for name, known in devices().items():

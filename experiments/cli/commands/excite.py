@@ -8,16 +8,14 @@ from typing import TYPE_CHECKING
 
 from idbench.experiments.cli.command import command_of, with_own_parts
 from idbench.experiments.cli.options.jobs import Excite
-from idbench.experiments.cli.saving import Files, saved, write_scenario
+from idbench.experiments.cli.saving import Files, folder_of, saved, write_scenario
 from idbench.experiments.excite.excited import Excited
 from idbench.experiments.excite.job import designed, excited, write_motion
 from idbench.experiments.excite.sequence import MotionSequence
-from idbench.experiments.inputs import files_of
 from idbench.experiments.judgement.warnings import FILE, warnings_of_robot
 from idbench.experiments.program import program
 from idbench.experiments.recording.audience import Audience
 from idbench.experiments.reports.excite import print_excited, print_sequence, report
-from idbench.experiments.results.folder import ResultsFolder
 from idbench.experiments.results.page import Page, progress_of
 from idbench.identify.files.log_file import write_log
 from idbench.sim.limits.motion_limits import looser
@@ -29,10 +27,8 @@ if TYPE_CHECKING:
 def excite(options: Excite) -> None:
     """Design a motion, or a sequence of them, save and show it."""
     stem, design = Path(options.robot).stem, designed(with_own_parts(options))
-    command = command_of(options, out=True)
-    whole = command_of(options, absolute=True)
-    out = options.out or Path("runs") / f"excited-{stem}"
-    folder, page = ResultsFolder(out, "excite", whole, options.force, files_of(options)), Page(machine=options.json)
+    command, page = command_of(options, out=True), Page(machine=options.json)
+    folder = folder_of(options, options.out or Path("runs") / f"excited-{stem}")
     with options.watching.audience() as audience, closing(page), folder.held():
         with progress_of(f"designing a motion of {stem}") as progress:
             found, sequence = excited(with_own_parts(options), progress)

@@ -60,7 +60,8 @@ class Follower:
         size, since = -1, time.monotonic()
         try:
             while True:
-                now, rest = self._size(), min(EVERY, patience / 2)
+                now = self.path.stat().st_size if self.path.is_file() else 0
+                rest = min(EVERY, patience / 2)
                 if now != size:
                     size, began = now, time.monotonic()
                     self._look()
@@ -87,9 +88,6 @@ class Follower:
         whole = self.path.read_bytes() if self.path.is_file() else b""
         end = whole.rfind(b"\n") + 1
         return whole[:end], whole[end:]
-
-    def _size(self) -> int:
-        return self.path.stat().st_size if self.path.is_file() else 0
 
     def _look(self) -> None:
         log = self._so_far()

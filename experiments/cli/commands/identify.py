@@ -12,15 +12,10 @@ from idbench.experiments.cli.command import command_of, with_own_parts
 from idbench.experiments.cli.commands.follow import Follower
 from idbench.experiments.cli.commands.identify_views import Shown, require_layer, require_targets, view_all
 from idbench.experiments.cli.options.jobs import Identify
+from idbench.experiments.cli.saving import folder_of
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.fit import Fit
-from idbench.experiments.identification.job import (
-    fit_of,
-    loaded_logs,
-    notes_of,
-    request_of,
-    summary_of,
-)
+from idbench.experiments.identification.job import fit_of, loaded_logs, notes_of, request_of, summary_of
 from idbench.experiments.identification.logs import delay_method
 from idbench.experiments.identification.reading import DELAY_FOUND, file_of
 from idbench.experiments.identification.request import Request
@@ -43,10 +38,9 @@ from idbench.identify.files.log_file import write_log
 def identify(options: Identify) -> None:
     """Identify logs, judge the result, save and show it."""
     page, request = Page(machine=options.json), request_of(with_own_parts(options))
-    command, read = command_of(options, out=True), files_of(options)
-    whole, log = command_of(options, absolute=True), file_of(options.log[0]).absolute()
-    folder = ResultsFolder(options.out, "identify", whole, options.force, read) if options.out else None
-    require_targets(options, request.robot_model, folder, read)
+    command, log = command_of(options, out=True), file_of(options.log[0]).absolute()
+    folder = folder_of(options, options.out) if options.out else None
+    require_targets(options, request.robot_model, folder, files_of(options))
     require_layer(options, request.label, command)
     with ExitStack() as stack:
         stack.enter_context(closing(page))

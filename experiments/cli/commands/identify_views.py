@@ -53,24 +53,21 @@ def report(shown: Shown, attempts: Attempts) -> None:
 
 def recording(shown: Shown) -> None:
     """Write the recording, or show it to who watches."""
-    run, rerun = shown.options.log[0], shown.options.watching.rerun
+    run, rerun, fit = shown.options.log[0], shown.options.watching.rerun, shown.judgement.fit
     layered = (run / RECORDING).is_file()  # the folder of a run, whose recording gets a layer
     into = shown.folder or (ResultsFolder(run, "run", shown.command, shown.options.force) if layered else None)
     if not rerun or (into is None and shown.audience is None):
         return
-    if shown.judgement.fit.logs.long:
+    if fit.logs.long:
         shown.page.print("not recorded: the rows of such a long log are not kept; identify a part of it to look inside")
         return
     from idbench.experiments.recording.identification_recording import add_layer, record_log
     from idbench.experiments.results.attempts import write_streams
 
     alone = shown.folder is not None or into is None
-    made = (
-        record_log(shown.judgement.fit.on(0), shown.audience) if alone else add_layer(run, shown.judgement.fit, shown.audience)
-    )
-    write_streams(made, into)
-    if len(shown.judgement.fit.logs.fitted) > 1:
-        shown.page.print(f"recorded: {shown.judgement.fit.logs.name(0)}, by the estimate of all logs")
+    write_streams(record_log(fit.on(0), shown.audience) if alone else add_layer(run, fit, shown.audience), into)
+    if len(fit.logs.fitted) > 1:
+        shown.page.print(f"recorded: {fit.logs.name(0)}, by the estimate of all logs")
     if into and not shown.folder:
         shown.page.print(f"added to the recording in {run}{shown.options.watching.hint(run)}", soft_wrap=True)
 
@@ -87,9 +84,8 @@ def require_layer(options: Identify, label: str, command: str) -> None:
         return
     there = Manifest.of(run).files.get(name)
     if there is not None and there.command != command and (run / name).is_file():
-        raise ExperimentError(
-            f"{run} holds the layer {label!r} of `{there.command}`: choose another --label, or replace it with --force"
-        )
+        holds = f"{run} holds the layer {label!r} of `{there.command}`"
+        raise ExperimentError(f"{holds}: choose another --label, or replace it with --force")
 
 
 def view_all(shown: Shown, attempts: Attempts) -> None:
@@ -99,18 +95,15 @@ def view_all(shown: Shown, attempts: Attempts) -> None:
     told = set[str]()
     for option, path in _targets(shown.options):
         attempts.attempt(f"{option} {path}", lambda option=option, path=path: _export(shown, option, path, told))  # type: ignore[misc]
-    if shown.folder:
-        hint = shown.options.watching.hint(shown.folder.out)
-        shown.page.print(f"written to {shown.folder.out}{hint}", soft_wrap=True)
-    else:
-        shown.page.print(NOT_SAVED)
+    out = shown.folder.out if shown.folder else None
+    shown.page.print(f"written to {out}{shown.options.watching.hint(out)}" if out else NOT_SAVED, soft_wrap=True)
     shown.page.show()
 
 
 def _export(shown: Shown, option: str, path: Path, told: set[str]) -> None:
     """Write a file for other software, with the parameters of the first model that has an estimate."""
-    export = EXPORTS[path.suffix]
-    made = export.render(shown.judgement.fit, shown.judgement.fit.leading, path)
+    export, leading = EXPORTS[path.suffix], shown.judgement.fit.leading
+    made = export.render(shown.judgement.fit, leading, path)
     if path not in made.texts:  # a folder of files
         folder_for(path, option)
     for target, text in made.texts.items():
@@ -119,8 +112,7 @@ def _export(shown: Shown, option: str, path: Path, told: set[str]) -> None:
         else:
             write_text(target, text, option, force=shown.options.force, read=shown.folder.read if shown.folder else ())
     named = ", ".join(map(str, made.texts if path in made.texts else [path]))
-    what = f"{export.what} with the parameters of the {shown.judgement.fit.leading} model"
-    shown.page.print(Text(f"written to {named}: {what}"), soft_wrap=True)
+    shown.page.print(Text(f"written to {named}: {export.what} with the parameters of the {leading} model"), soft_wrap=True)
     for note in (note for note in made.notes if note not in told):
         shown.page.print(Text(note), soft_wrap=True)
     told.update(made.notes)

@@ -10,7 +10,7 @@ from rich.text import Text
 
 from idbench.experiments.cli.command import command_of, with_own_parts
 from idbench.experiments.cli.options.jobs import IdentifyGains, IdentifyPayload
-from idbench.experiments.cli.saving import save_summary
+from idbench.experiments.cli.saving import folder_of, require_target, save_summary
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.inputs import files_of
 from idbench.experiments.loads.job import LoadFit, gains_of, payload_of, simulated_pairs
@@ -20,7 +20,7 @@ from idbench.experiments.loads.simulated import PairScore
 from idbench.experiments.results.attempts import Attempts
 from idbench.experiments.results.folder import ResultsFolder
 from idbench.experiments.results.page import COLORS, NOT_SAVED, Page, progress_of, stages_of
-from idbench.experiments.results.writing import require_free, write_text
+from idbench.experiments.results.writing import write_text
 from idbench.experiments.text import new_table, print_titled
 from idbench.sim.robot.rewrite import with_body
 
@@ -28,9 +28,7 @@ from idbench.sim.robot.rewrite import with_body
 def payload(options: IdentifyPayload) -> None:
     """Identify what the gripper holds."""
     if (path := options.write_mjcf) is not None:
-        if path.suffix != ".xml":
-            raise ExperimentError(f"--write-mjcf {path}: its name must end with .xml")
-        require_free(path, "--write-mjcf", force=options.force, read=files_of(options))
+        require_target("--write-mjcf", path, ".xml", force=options.force, read=files_of(options))
     with _page(options) as (page, folder):
         if options.simulate is not None:
             _compare_ways(page, options)
@@ -56,12 +54,8 @@ def gains(options: IdentifyGains) -> None:
 @contextmanager
 def _page(options: IdentifyPayload | IdentifyGains) -> Iterator[tuple[Page, ResultsFolder | None]]:
     """Give the page of a command and the folder of its results, and say in the end where they are."""
-    page, folder = Page(machine=options.json), None
+    page, folder = Page(machine=options.json), folder_of(options, options.out) if options.out else None
     page.found |= {"experiment": options.called}
-    if options.out is not None:
-        whole = command_of(options, absolute=True)
-        folder = ResultsFolder(options.out, options.called, whole, options.force, files_of(options))
-        folder.check()
     with closing(page), folder.held() if folder else nullcontext():
         yield page, folder
         page.print(f"written to {folder.out}" if folder else NOT_SAVED, soft_wrap=True)
@@ -123,12 +117,10 @@ def _compare_ways(page: Page, options: IdentifyPayload) -> None:
 def _try_gains(page: Page, options: IdentifyGains) -> None:
     """Print how well gains of a simulated robot are found."""
     pairs = simulated_pairs(with_own_parts(options))
-    known = {"ML": pairs.truth["ML"]}
+    mass = pairs.truth["ML"]
     with progress_of("gains") as told:
-        score = pairs.gains(known, told)
-    _print_scores(
-        page, {"gains": score}, f"{pairs.scenario.name}: gains from a payload of {known['ML']:g} kg, {pairs.runs} runs"
-    )
+        score = pairs.gains({"ML": mass}, told)
+    _print_scores(page, {"gains": score}, f"{pairs.scenario.name}: gains from a payload of {mass:g} kg, {pairs.runs} runs")
     page.found |= {"path": pairs.scenario.name, **_summary(score)}
 
 
@@ -137,8 +129,7 @@ def _print_scores(page: Page, scores: dict[str, PairScore], title: str) -> None:
     names = next((score.names for score in scores.values() if score.names), ())
     grid = new_table("", [f"{way}\n{what}" for way in scores for what in ("bias", "rms")])
     for i, name in enumerate(names):
-        cells = (f"{x[i]:.2g}" for s in scores.values() if s.names for x in (s.bias, s.rms))
-        grid.add_row(name, *cells)
+        grid.add_row(name, *(f"{x[i]:.2g}" for s in scores.values() if s.names for x in (s.bias, s.rms)))
     grid.add_section()
     grid.add_row("within 2 sigma", *(c for s in scores.values() if s.names for c in ("", f"{100 * s.coverage:.1f} %")))
     grid.add_row("s a run", *(c for s in scores.values() if s.names for c in ("", f"{s.seconds:.2g}")))

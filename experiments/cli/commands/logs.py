@@ -23,7 +23,7 @@ from idbench.identify import LogError, MotionLog
 from idbench.identify.data.log_columns import LogColumns
 from idbench.identify.data.resample import Repaired
 from idbench.identify.files.guess import Guess, UnknownColumnsError, guess
-from idbench.identify.files.layout import LAYOUT, LogLayout, Source
+from idbench.identify.files.layout import LAYOUT, LogLayout, Source, own_layout
 from idbench.identify.files.log_file import CSV, WRITTEN, read_log, write_log
 from idbench.identify.files.reading import LAYOUT_FILE, layout_of, read_columns
 from idbench.identify.files.table import needs_gain
@@ -34,7 +34,7 @@ ROUNDED = 1e-4  # Departure of a step's logarithm from a whole number up to whic
 def show_log(options: ShowLog) -> None:
     """Show what is understood of a log: columns, units, rate, ranges, noise; write a layout to start from."""
     page = Page(machine=options.json)
-    for option, path in (("--write", _target(options) if options.write else None), ("--picture", options.picture)):
+    for option, path in (("--write", own_layout(options.log) if options.write else None), ("--picture", options.picture)):
         if path is not None:
             require_free(path, option, force=options.force, read=[options.log])
     found, columns = _understood(options)
@@ -80,15 +80,14 @@ def _understood(options: ShowLog) -> tuple[Guess, LogColumns]:
     except UnknownColumnsError as error:
         if not options.write:
             raise ExperimentError(f"{error}; --write makes one to correct") from error
-        write_text(_target(options), error.start, "--write", force=options.force)
-        raise ExperimentError(f"{error}: {_target(options)} is one to correct") from error
+        write_text(own_layout(options.log), error.start, "--write", force=options.force)
+        raise ExperimentError(f"{error}: {own_layout(options.log)} is one to correct") from error
     except LogError as error:
         raise ExperimentError(str(error)) from error
     layout = found.layout
     if not layout.t.columns and not layout.t.fs:
-        raise ExperimentError(
-            f"{path} has no column of times that idbench recognises: say which with --columns t=NAME, or state fs in a log.toml"
-        )
+        none = f"{path} has no column of times that idbench recognises"
+        raise ExperimentError(f"{none}: say which with --columns t=NAME, or state fs in a log.toml")
     return found, read_columns(path, _currents_as_torques(layout))
 
 
@@ -102,8 +101,7 @@ def _print_layout(page: Page, layout: LogLayout, doubts: Sequence[str]) -> None:
     for name in ("t", "q", "qd", "tau"):
         source: Source = getattr(layout, name)
         if source.columns or source.fs:
-            columns = ", ".join(source.columns) if source.columns else f"{source.fs:g} Hz"
-            grid.add_row(name, source.unit or "", columns)
+            grid.add_row(name, source.unit, ", ".join(source.columns) if source.columns else f"{source.fs:g} Hz")
     print_titled(page, "what its columns are", grid)
     for doubt in doubts:
         page.print(Text(f"look: {doubt}"), soft_wrap=True)
@@ -114,7 +112,8 @@ def _print_facts(page: Page, facts: LogFacts, unit: str) -> None:
     grid = new_table("", heads)
     for row in facts.rows:
         step = row["encoder_step"]
-        bits = "" if step is None else "file" if _decimal(step) else f"{log2(2 * pi / step):.1f}"
+        by_file = step is not None and abs(log10(step) - round(log10(step))) < ROUNDED
+        bits = "" if step is None else "file" if by_file else f"{log2(2 * pi / step):.1f}"
         grid.add_row(
             row["joint"],
             *(f"{x:.4g}" for x in row["q"]),
@@ -130,19 +129,8 @@ def _print_facts(page: Page, facts: LogFacts, unit: str) -> None:
     print_titled(page, f"{len(t)} rows, {t[-1] - t[0]:.4g} s, {facts.log.fs:.5g} Hz", grid)
 
 
-def _decimal(step: float) -> bool:
-    """True if a step is that to which a file rounds."""
-    return abs(log10(step) - round(log10(step))) < ROUNDED
-
-
-def _target(options: ShowLog) -> Path:
-    """Path of a log's layout."""
-    stem = options.log.with_suffix("") if options.log.suffix.lower() == ".gz" else options.log
-    return stem.with_suffix(LAYOUT_FILE)
-
-
 def _write(page: Page, options: ShowLog, layout: LogLayout) -> None:
-    target = _target(options)
+    target = own_layout(options.log)
     write_text(target, layout.text, "--write", force=options.force)
     every = ", and every other log of the folder" if target.name == LAYOUT else ""
     page.print(Text(f"written to {target}: correct it; this log is read by it from now on{every}"), soft_wrap=True)
@@ -163,8 +151,7 @@ def resample(options: Resample) -> None:
     if meaning is None:
         raise ExperimentError(f"{options.log} does not say what its torque means: add --torque held, instantaneous or averaged")
     made = Repaired.of(columns, channel_of(columns.torque, meaning, options.torque_delay), options.fs)
-    several = len(made.logs) > 1
-    outs = [out.with_stem(f"{out.stem}{k + 1}") if several else out for k in range(len(made.logs))]
+    outs = [out] if len(made.logs) == 1 else [out.with_stem(f"{out.stem}{k + 1}") for k in range(len(made.logs))]
     for path in outs:  # all of them, before the first is written
         require_free(path, "--out", force=options.force, read=read)
     with closing(page):
@@ -182,8 +169,7 @@ def export(options: Export) -> None:
     logs, page = sorted(options.folder.glob("log*.parquet")), Page()
     if not logs:
         raise ExperimentError(f"there is no log in {options.folder}: name a results folder, such as runs/table1")
-    out = options.out or options.folder
-    made = folder_for(out, "--out")
+    made = folder_for(options.out or options.folder, "--out")
     robot = stated_by(options.folder).get("robot", SCARA)
     named = "" if robot == SCARA else f" --robot {shlex.quote(robot)}"
     with closing(page):

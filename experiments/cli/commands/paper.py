@@ -7,27 +7,17 @@ from pathlib import Path
 
 from rich.console import Console
 
-from idbench.experiments.cli.command import command_of
 from idbench.experiments.cli.commands.inner import doubt_window, recording_of, require_window
 from idbench.experiments.cli.options.jobs import SearchCommand, Table1Command, Table2Command
-from idbench.experiments.cli.saving import saved
+from idbench.experiments.cli.saving import folder_of, saved
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.paper.job import Searching, searched, table1_of
 from idbench.experiments.paper.table1 import print_table1
 from idbench.experiments.paper.table2 import Table2, print_table2
-from idbench.experiments.results.folder import ResultsFolder
 from idbench.experiments.results.page import Page, progress_of
 from idbench.experiments.results.writing import require_free, write_text
 from idbench.identify.files.log_file import write_log
 from idbench.sim.scenario.scenario_file import load, to_toml
-
-
-def _folder(options: Table1Command | Table2Command, experiment: str) -> ResultsFolder:
-    """Return the folder of a table's results."""
-    out = options.out or Path("runs") / experiment
-    folder = ResultsFolder(out, experiment, command_of(options, absolute=True), options.force)
-    folder.check()
-    return folder
 
 
 def compare(options: Table1Command) -> None:
@@ -35,7 +25,7 @@ def compare(options: Table1Command) -> None:
     if options.motions is not None:
         _over_motions(options, options.motions)
         return
-    folder, page = _folder(options, "table1"), Page(machine=options.json)
+    folder, page = folder_of(options, options.out or Path("runs/table1")), Page(machine=options.json)
     with options.watching.audience() as audience, closing(page), folder.held():
         with _searching() as told:
             table = table1_of(options, told)
@@ -53,10 +43,10 @@ def _over_motions(options: Table1Command, motions: int) -> None:
     from idbench.experiments.paper.motions import Table1Motions, picture, print_motions  # with figures, which tables lack
 
     if options.scenario is not None or options.chain != "all":
-        raise ExperimentError(
-            "--motions draws motions of its own and compares the paper's chains: leave --scenario and --chain out"
-        )
-    folder, page = _folder(options, "table1-motions"), Page(machine=options.json)
+        what = "--motions draws motions of its own and compares the paper's chains"
+        raise ExperimentError(f"{what}: leave --scenario and --chain out")
+    folder = folder_of(options, options.out or Path("runs/table1-motions"), "table1-motions")
+    page = Page(machine=options.json)
     with closing(page), folder.held():
         with progress_of("drawing and identifying motions") as progress:
             found = Table1Motions(motions, options.seed or 0, progress=progress)
@@ -89,7 +79,7 @@ def _searching() -> Iterator[Searching]:
 
 def table2(options: Table2Command) -> None:
     """Repeat the paper's experiment and attribute its errors."""
-    watching, folder = options.watching, _folder(options, "table2")
+    watching, folder = options.watching, folder_of(options, options.out)
     require_window(options.inner, watching)
     page, described = Page(machine=options.json), load(options.scenario)
     with watching.audience() as audience, closing(page), folder.held():

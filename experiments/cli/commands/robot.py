@@ -16,6 +16,7 @@ from idbench.experiments.identification.robot_model import RobotModel, absolute
 from idbench.experiments.judgement.warnings import FILE, warnings_of_robot
 from idbench.experiments.reports.budget import largest_torques
 from idbench.experiments.results.page import Page
+from idbench.experiments.results.writing import finite
 from idbench.experiments.text import new_table, print_titled
 from idbench.identify import Array, Basis
 from idbench.identify.basis.operations import COLUMNS, Operations, operations
@@ -50,13 +51,9 @@ def describe(options: DescribeRobot) -> None:
 
 def _summary(robot_model: RobotModel, truth: dict[str, float], counts: dict[str, Operations]) -> dict[str, Any]:
     """Content of --json for a robot."""
-    tree = robot_model.tree
     return {
         "robot": robot_model.name,
-        "joints": [
-            {"name": joint.name, "kind": joint.kind, "range": [x if isfinite(x) else None for x in joint.range]}
-            for joint in tree.joints
-        ],
+        "joints": [{"name": j.name, "kind": j.kind, "range": [finite(x) for x in j.range]} for j in robot_model.tree.joints],
         "parameters": [
             {"name": p.name, "unit": p.unit, "kind": p.kind, "joint": p.joint, "value": truth[p.name]}
             for p in robot_model.basis.parameters
@@ -77,12 +74,8 @@ def _print_joints(page: Console, robot_model: RobotModel) -> None:
         grid.add_row(f"{j + 1} {joint.name}", joint.kind, parent, *ends, *(f"{x:g}" if x else "" for x in values))
     print_titled(page, f"robot {tree.name}: {tree.n} joints on a base that is fixed to the ground", grid)
     if not any(joint.armature for joint in tree.joints):
-        filed = bool(model.dof_armature.any())
-        why = (
-            "no armature is identified (--armature none)"
-            if robot_model.asked.armature == "none"
-            else "the file has no armatures"
-        )
+        asked, filed = robot_model.asked.armature != "none", model.dof_armature.any()
+        why = "the file has no armatures" if asked else "no armature is identified (--armature none)"
         more = "" if filed else "; behind gears rotors have more inertia than links: --armature all"
         page.print(Text(why + more))
 
@@ -116,6 +109,5 @@ def _print_budget(page: Console, joints: Sequence[str], largest: Mapping[str, Ar
     for j, joint in enumerate(joints):
         values = [value[j] for value in largest.values()]
         grid.add_row(joint, *(f"{value:.3g}" if np.isfinite(value) else "" for value in values))
-    print_titled(
-        page, "torque budget: largest [N m, N of slides] along 20 random moves of 0.8 to 1.6 s, at most 2 rad/s or m/s", grid
-    )
+    motion = "along 20 random moves of 0.8 to 1.6 s, at most 2 rad/s or m/s"
+    print_titled(page, f"torque budget: largest [N m, N of slides] {motion}", grid)

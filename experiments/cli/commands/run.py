@@ -8,20 +8,18 @@ from shlex import quote
 
 from rich.text import Text
 
-from idbench.experiments.cli.command import command_of, with_own_parts
+from idbench.experiments.cli.command import with_own_parts
 from idbench.experiments.cli.commands.inner import doubt_window, recording_of, require_window
 from idbench.experiments.cli.options.jobs import RunCommand
-from idbench.experiments.cli.saving import Files, saved, write_scenario
+from idbench.experiments.cli.saving import Files, folder_of, saved, write_scenario
 from idbench.experiments.identification.log_warnings import warnings_of_log
 from idbench.experiments.identification.robot_model import SCARA
 from idbench.experiments.identification.scenario_run import ScenarioRun
-from idbench.experiments.inputs import files_of
 from idbench.experiments.judgement.warnings import FILE, LOG, MODEL, warnings_of_robot
 from idbench.experiments.plugin_tables import plugin_conflicts
 from idbench.experiments.program import program
 from idbench.experiments.reports.estimates import models_in_full
 from idbench.experiments.reports.printed import print_fit
-from idbench.experiments.results.folder import ResultsFolder
 from idbench.experiments.results.page import Page, stages_of
 from idbench.experiments.study.one_run import run_of
 from idbench.identify.files.log_file import write_log
@@ -35,9 +33,7 @@ def run(options: RunCommand) -> None:
     made = run_of(with_own_parts(options), lambda said: page.print(Text(said), soft_wrap=True))
     require_window(options.inner, watching)
     name = made.scenario.name
-    command = command_of(options, absolute=True)
-    folder = ResultsFolder(options.out or Path("runs") / name, "run", command, options.force, files_of(options))
-    folder.check()
+    folder = folder_of(options, options.out or Path("runs") / name)
     made.require_bearable(options.yes)
     with watching.audience() as audience, closing(page), folder.held():
         robot_model = made.request.robot_model

@@ -9,25 +9,17 @@ from rich.text import Text
 
 from idbench.experiments.cli.command import command_of
 from idbench.experiments.cli.options.jobs import IdentifyServo
-from idbench.experiments.cli.saving import save_summary
-from idbench.experiments.errors import ExperimentError
+from idbench.experiments.cli.saving import folder_of, require_target, save_summary
 from idbench.experiments.identification.robot_model import absolute
 from idbench.experiments.inputs import files_of
 from idbench.experiments.recording.audience import Audience
 from idbench.experiments.results.attempts import Attempts
 from idbench.experiments.results.folder import ResultsFolder
 from idbench.experiments.results.page import NOT_SAVED, Page, stages_of
-from idbench.experiments.results.writing import require_free, write_text
+from idbench.experiments.results.writing import write_text
 from idbench.experiments.servo.job import ServosFit, servos_identified
 from idbench.experiments.servo.joints import Identified
-from idbench.experiments.servo.servo_files import (
-    for_mujoco,
-    in_mujoco,
-    inexpressible,
-    mjcf_of,
-    servo_function,
-    without_servo,
-)
+from idbench.experiments.servo.servo_files import for_mujoco, in_mujoco, inexpressible, mjcf_of, servo_function, without_servo
 from idbench.experiments.servo.servo_text import choice_table, error_line, servo_table
 from idbench.identify.servo.choice import ServoFrictionChoice
 
@@ -37,16 +29,10 @@ if TYPE_CHECKING:
 
 def servo(options: IdentifyServo) -> None:
     """Identify servos."""
-    page, folder = Page(machine=options.json), None
-    if options.out is not None:
-        whole = command_of(options, absolute=True)
-        folder = ResultsFolder(options.out, "servo", whole, options.force, files_of(options))
-        folder.check()
+    page, folder = Page(machine=options.json), folder_of(options, options.out) if options.out else None
     for option, path, ending in (("--write-mjcf", options.write_mjcf, ".xml"), ("--write", options.write, ".py")):
         if path is not None:
-            if path.suffix != ending:
-                raise ExperimentError(f"{option} {path}: its name must end with {ending}")
-            require_free(path, option, force=options.force, read=files_of(options))
+            require_target(option, path, ending, force=options.force, read=files_of(options))
     with options.watching.audience() as audience, closing(page), folder.held() if folder else nullcontext():
         page.found |= {"experiment": "servo", "robot": absolute(str(options.robot)), "friction": options.friction, "joints": {}}
         made = _identified(page, folder, options)
@@ -59,18 +45,16 @@ def servo(options: IdentifyServo) -> None:
         page.show()
         save_summary(page, folder)
         with Attempts("the results are printed" + (f", and in {folder.out}" if folder else ""), folder) as attempts:
-            if options.write_mjcf is not None:
-                attempts.attempt("--write-mjcf", lambda: _write(page, options, made))
+            if (robot_file := options.write_mjcf) is not None:
+                attempts.attempt("--write-mjcf", lambda: _write(page, options, robot_file, made))
                 attempts.attempt("summary.json", lambda: save_summary(page, folder))
             attempts.file("report.html", lambda: made.document().page(command_of(options, out=True)))
-            if options.write is not None:
-                attempts.attempt("--write", lambda: _write_function(page, options, made))
+            if (python_file := options.write) is not None:
+                attempts.attempt("--write", lambda: _write_function(page, options, python_file, made))
             if options.watching.rerun and (folder is not None or audience is not None):
                 attempts.recording(lambda: _recorded(made, audience))
-        if folder is not None:
-            page.print(f"written to {folder.out}{options.watching.hint(folder.out)}", soft_wrap=True)
-        else:
-            page.print(NOT_SAVED)
+        where = f"written to {folder.out}{options.watching.hint(folder.out)}" if folder else NOT_SAVED
+        page.print(where, soft_wrap=True)
 
 
 def _identified(page: Page, folder: ResultsFolder | None, options: IdentifyServo) -> ServosFit:
@@ -97,13 +81,9 @@ def _identified(page: Page, folder: ResultsFolder | None, options: IdentifyServo
     return made
 
 
-def _write(page: Page, options: IdentifyServo, fit: ServosFit) -> None:
+def _write(page: Page, options: IdentifyServo, path: Path, fit: ServosFit) -> None:
     """Write the robot's MJCF with the servos, and measure it in plain MuJoCo."""
-    servos = fit.servos
-    path = options.write_mjcf
-    assert path is not None
-    place = path.absolute().parent
-    found = for_mujoco(fit.fits)
+    servos, found, place = fit.servos, for_mujoco(fit.fits), path.absolute().parent
     text = mjcf_of(servos, found, place, options.position)
     write_text(path, text, "--write-mjcf", force=options.force, read=files_of(options))
     page.print(Text(f"written to {path}: the robot with its servos, to be commanded with angles of the file"), soft_wrap=True)
@@ -120,10 +100,8 @@ def _write(page: Page, options: IdentifyServo, fit: ServosFit) -> None:
             page.print(Text(error_line(f"{path.name} in plain MuJoCo, {name}", joint, np.array([e]))), soft_wrap=True)
 
 
-def _write_function(page: Page, options: IdentifyServo, fit: ServosFit) -> None:
+def _write_function(page: Page, options: IdentifyServo, path: Path, fit: ServosFit) -> None:
     servos = fit.servos
-    path = options.write
-    assert path is not None
     known = {joint: (servos.known.servo(joint, ""), own) for joint, own in fit.fits.items()}
     text = servo_function(Path(servos.robot).name, known, [log.name for log in servos.logs])
     write_text(path, text, "--write", force=options.force, read=files_of(options))

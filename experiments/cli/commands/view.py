@@ -77,9 +77,8 @@ def _latest() -> Path:
     """Return the folder of the recording that was written last."""
     found = sorted(LATEST.glob(f"*/{BASE}"), key=lambda path: path.stat().st_mtime)
     if not found:
-        raise ResultsError(
-            f"there is no recording in {LATEST}: name a results folder, or make one, such as `idbench run ripple`"
-        )
+        way_out = "name a results folder, or make one, such as `idbench run ripple`"
+        raise ResultsError(f"there is no recording in {LATEST}: {way_out}")
     return found[-1].parent
 
 

@@ -5,20 +5,9 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 from idbench.experiments.cli.command import Command
+from idbench.experiments.requests import words
 from idbench.experiments.requests.shared import ColumnOptions, MountingOptions, Parameters
-from idbench.experiments.requests.words import (
-    Delay,
-    File,
-    Folder,
-    Hertz,
-    Joints,
-    Json,
-    Log,
-    ThisRobot,
-    ThisScenario,
-    Torque,
-    Word,
-)
+from idbench.experiments.requests.words import Word
 
 
 @dataclass(frozen=True)
@@ -30,7 +19,7 @@ class View(Command, called="view", action="view:view"):
     tab: str = ""
     """Tab to show first: overview, friction, drive, filters, noise, excitation, parameters, iterations, torques, compare, study
     or table2."""
-    save: File = None
+    save: words.File = None
     """Write the recording and its layers to one file (.rrd) instead of opening them."""
     force: bool = False
     """Replace an existing file."""
@@ -40,17 +29,17 @@ class View(Command, called="view", action="view:view"):
 class ShowLog(Command, called="log", action="logs:show_log"):
     """Show the contents of a log: columns, units, rate, clock, ranges, noise, encoders. Needs no robot."""
 
-    log: Log
+    log: words.Log
     """The file: CSV and other text, Parquet, NumPy, Matlab, a ROS bag; or its log.toml."""
     reading: ColumnOptions = ColumnOptions()  # noqa: RUF009  # frozen
     """What the columns are; guessed from names and values if not stated."""
     write: bool = False
     """Write this description to NAME.toml beside the log, to be corrected. Other commands read the log as it states."""
-    picture: File = None
+    picture: words.File = None
     """Write a picture (PNG or SVG): motion, torques, spectra, time steps."""
     force: bool = False
     """Guess again and replace an existing description."""
-    json: Json = False
+    json: words.Json = False
     """Print as JSON; human-readable text goes to the error stream."""
 
 
@@ -58,16 +47,16 @@ class ShowLog(Command, called="log", action="logs:show_log"):
 class Resample(Command, called="resample", action="logs:resample"):
     """Resample a log at a fixed frequency and repair its clock: repeated rows, jitter, missing samples, gaps."""
 
-    log: Log
+    log: words.Log
     """The log, with arbitrary time steps."""
     out: Path
     """File to write, CSV or Parquet. A log with gaps becomes several numbered files."""
-    fs: Hertz = None
+    fs: words.Hertz = None
     """Sampling frequency [Hz]. Default: that of the log."""
     reading: ColumnOptions = ColumnOptions()  # noqa: RUF009  # frozen
-    torque: Torque = None
+    torque: words.Torque = None
     """What a torque sample means. Required unless the file states it. A held torque becomes averaged."""
-    torque_delay: Delay = None
+    torque_delay: words.Delay = None
     """Delay from a sample to the torque that it stands for, in seconds."""
     force: bool = False
     """Replace an existing file."""
@@ -77,9 +66,9 @@ class Resample(Command, called="resample", action="logs:resample"):
 class Export(Command, called="export", action="logs:export"):
     """Write the logs of a results folder as CSV."""
 
-    folder: Log
+    folder: words.Log
     """Results folder, such as runs/table2."""
-    out: Folder = None
+    out: words.Folder = None
     """Folder to write to. Default: the results folder."""
     force: bool = False
     """Replace existing files."""
@@ -93,17 +82,17 @@ class ShowDevice(Command, called="device", action="device:device"):
     """Of the device. Default: list all."""
     robot: Annotated[str | None, Word("ROBOT")] = None
     """Robot that it drives: name, or file (MJCF or URDF). Default: a pendulum."""
-    joints: Joints = ()
+    joints: words.Joints = ()
     """Joints that it drives. Default: all."""
     kp: float = 16.0
     """Gain of the firmware."""
-    write_mjcf: File = None
+    write_mjcf: words.File = None
     """Write the robot's MJCF with the device as `dcmotor` actuators."""
-    write: File = None
+    write: words.File = None
     """Write a servo.toml of what is known of it."""
     force: bool = False
     """Replace existing files."""
-    json: Json = False
+    json: words.Json = False
     """Print as JSON, with the covariance; human-readable text goes to the error stream."""
 
 
@@ -111,9 +100,9 @@ class ShowDevice(Command, called="device", action="device:device"):
 class DescribeRobot(Command, called="robot", action="robot:describe"):
     """Show what is identifiable: joints, base parameters, and a torque budget."""
 
-    name: ThisRobot
+    name: words.ThisRobot
     """Name of a shipped robot, or its file: MJCF, URDF, or a table of Denavit-Hartenberg parameters (.toml)."""
-    json: Json = False
+    json: words.Json = False
     """Print joints and parameters as JSON; human-readable text goes to the error stream."""
     parameters: Parameters = Parameters()  # noqa: RUF009  # frozen
     mounting: MountingOptions = MountingOptions()  # noqa: RUF009  # frozen
@@ -123,9 +112,9 @@ class DescribeRobot(Command, called="robot", action="robot:describe"):
 class WriteScenario(Command, called="scenario", action="list:write_scenario"):
     """Write a scenario to a file, with every setting explained. Without a name: list the shipped scenarios."""
 
-    name: ThisScenario = None
+    name: words.ThisScenario = None
     """Name of a scenario, or a file."""
-    out: File = None
+    out: words.File = None
     """File (TOML) to write. Default: print it."""
     force: bool = False
     """Replace an existing file."""
@@ -146,7 +135,7 @@ class New(Command, called="new", action="authors:begin"):
     """Scenario to copy."""
     robot: Annotated[str, Word("NAME")] = "two_link"
     """Shipped robot of an example."""
-    out: File = None
+    out: words.File = None
     """File or folder to write. Default: NAME.toml, or NAME."""
 
 
@@ -156,7 +145,7 @@ class Check(Command, called="check", action="authors:check"):
 
     plugin: Annotated[str, Word(positional=True)]
     """Its name in `idbench list`, with its table if ambiguous (drives/ideal); or MODULE:CLASS."""
-    json: Json = False
+    json: words.Json = False
     """Print the checks and their results as JSON; human-readable text goes to the error stream."""
 
 
@@ -181,5 +170,5 @@ class Completion(Command, called="completion", action="completion:complete"):
 class List(Command, called="list", action="list:list_plugins"):
     """List all parts that can be combined, built-in and plug-ins."""
 
-    json: Json = False
+    json: words.Json = False
     """Print as JSON."""
