@@ -10,11 +10,7 @@ from idbench.identify.basis.symbols import flat, inputs
 from idbench.identify.basis.tape import Symbol, Tape, Value
 from idbench.identify.signals.signals import State
 
-COLUMNS = {
-    "explicit": ("explicit",),
-    "implicit": ("remainder", "momentum"),
-    "power": ("dissipation", "energy"),
-}
+COLUMNS = {"explicit": ("explicit",), "implicit": ("remainder", "momentum"), "power": ("dissipation", "energy")}
 """Model -> the columns c and e that it takes from a basis."""
 
 
