@@ -79,5 +79,4 @@ def interval_of(fit: Fit, model: str) -> dict[str, list[float]]:
     interval, nothing = fit.torque_intervals[model], [nan] * fit.basis.n
     if interval is None:
         return dict.fromkeys(("half", "speed", "torque"), nothing) | {"band": [nan]}
-    each = {name: getattr(interval, name).tolist() for name in ("half", "speed", "torque")}
-    return each | {"band": [interval.band]}
+    return {name: getattr(interval, name).tolist() for name in ("half", "speed", "torque")} | {"band": [interval.band]}

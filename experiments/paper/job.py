@@ -118,8 +118,7 @@ class TrajectorySearch:
     def _durations(self, rng: np.random.Generator) -> Array:
         """Return the times of the moves: whole samples, as the paper's plan of 100 Hz has them; together the motion's."""
         shares = rng.uniform(0.85, 1.15, MOVES)
-        ends = np.rint(np.cumsum(shares) / shares.sum() * MOTION * FS)
-        return np.diff(ends, prepend=0.0) / FS
+        return np.diff(np.rint(np.cumsum(shares) / shares.sum() * MOTION * FS), prepend=0.0) / FS
 
     def _drawn(self, rng: np.random.Generator, robot: Robot) -> Array:
         points = np.zeros((MOVES + 1, robot.n))
@@ -146,8 +145,7 @@ def table1_of(asked: Table1Request, searching: Searching | None = None) -> Table
     if asked.seed is not None and asked.scenario is not None:
         raise ExperimentError(f"--seed {asked.seed} and --scenario {asked.scenario} name two trajectories: give one")
     chains = CHAINS_COMPARED if asked.chain == "all" else (asked.chain,)
-    scenario = load(asked.scenario or SCENARIO) if asked.seed is None else searched(asked.seed, searching)
-    return Table1(scenario, chains)
+    return Table1(load(asked.scenario or SCENARIO) if asked.seed is None else searched(asked.seed, searching), chains)
 
 
 def searched(seed: int, searching: Searching | None = None) -> Scenario:

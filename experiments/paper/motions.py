@@ -62,8 +62,7 @@ class Errors:
         """True where the paper's error of each parameter lies inside the band, shape (p,)."""
         low, high = (self.percentiles(model, q) for q in BAND)
         paper = np.array(PAPER[model].error)
-        inside: npt.NDArray[np.bool_] = (low <= paper + ROUNDED) & (high >= paper - ROUNDED)
-        return inside
+        return (low <= paper + ROUNDED) & (high >= paper - ROUNDED)
 
 
 @dataclass(frozen=True, eq=False)

@@ -162,8 +162,7 @@ class Table1:
 
     def _identified(self, chain: Chain) -> dict[str, Estimate]:
         """Return the estimates of the three models, and of two integrated ones: energy (Eq. 11, 20), integral (after Eq. 9)."""
-        models = {name: MODELS.create(name) for name in MODELS}
-        return identify_each(self.log, scara(), models, chain, OrdinaryLeastSquares())
+        return identify_each(self.log, scara(), {name: MODELS.create(name) for name in MODELS}, chain, OrdinaryLeastSquares())
 
 
 OVER = {"energy": "power", "integral": "implicit"}  # Models that are others, integrated

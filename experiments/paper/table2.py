@@ -120,8 +120,7 @@ class Table2:
     def _identified(self, processing: str, model: str) -> Fit:
         logs = tuple(self.run.alone(i) for i in range(REALIZATIONS[model]))
         chain, estimator = PROCESSINGS[processing]
-        method = Method.named(chain, estimator).trimmed(self.rest)
-        request = Request(RobotModel(self.scenario.robot), (model,), method)
+        request = Request(RobotModel(self.scenario.robot), (model,), Method.named(chain, estimator).trimmed(self.rest))
         return fit(request, Logs(logs, truth=self.truth))
 
     @property

@@ -81,8 +81,7 @@ class Chart:
     def line(self, name: str, x: Array, y: Array, color: Color, width: float = 1.2, *, listed: bool = True) -> None:
         """Draw a line through values, with a gap where one is not finite, and list it in the legend."""
         where = self._where(x, y)
-        gaps = np.flatnonzero(~np.isfinite(where).all(axis=1))
-        runs = [run[np.isfinite(run).all(axis=1)] for run in np.split(where, gaps)]
+        runs = [run[np.isfinite(run).all(axis=1)] for run in np.split(where, np.flatnonzero(~np.isfinite(where).all(axis=1)))]
         self._strips(f"lines/{part(name)}", [run for run in runs if len(run) > 1], color, width, LINE_ORDER)
         if listed:
             self.list_entry(name, color)

@@ -43,8 +43,7 @@ def record_table1(table: Table1, audience: Audience | None = None) -> list[tuple
         recording_id(scenario.name, to_toml(scenario).encode()), table.robot, log.fs, ("measured",), reference.qd, audience
     )
     base.stream.describe(scenario=to_toml(scenario), seed=str(scenario.seed), fs_hz=f"{log.fs:g}")
-    planned = {"q/planned": reference.q, "qd/planned": reference.qd, "qdd/planned": reference.qdd}
-    base.replay(log, planned, reference.qd)
+    base.replay(log, {"q/planned": reference.q, "qd/planned": reference.qd, "qdd/planned": reference.qdd}, reference.qd)
     base.arm.trace(log.q)
     base.finish(table1_markdown(table))
     streams = [(BASE, base.stream)]
@@ -214,6 +213,5 @@ def _send_differences(stream: Stream, first: Compared, run: Compared, shift: flo
     t, found = difference(first.log, run.log, shift)
     for name, values in found.items():
         path = f"difference/{name}/{part(run.name)}"
-        names = [f"{name}{j + 1}, {run.name} - {first.name}" for j in range(run.log.n)]
-        stream.style(path, names, joint_colors(run.log.n))
+        stream.style(path, [f"{name}{j + 1}, {run.name} - {first.name}" for j in range(run.log.n)], joint_colors(run.log.n))
         stream.curves(path, [seconds(np.asarray(t))], values)

@@ -182,8 +182,7 @@ class Base:
     def _curves(self, stream: Stream, path: str, times: Times, values: Array) -> None:
         if path not in stream.paths:
             kind, colors = path.rsplit("/", 1)[-1], len(self._joints)
-            names = [f"{kind} {joint}" for joint in self._joints]
-            stream.style(path, names, kind_colors(kind, colors), WIDTHS.get(kind, 1.5))
+            stream.style(path, [f"{kind} {joint}" for joint in self._joints], kind_colors(kind, colors), WIDTHS.get(kind, 1.5))
         stream.curves(path, times, values)
 
     def _accelerate(self, t: Array, qd: Array) -> None:

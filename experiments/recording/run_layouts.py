@@ -169,8 +169,7 @@ def parameters(shelf: Shelf) -> Part:
     if not found:  # of a log that still grows
         return running
     if len(found) == len(shelf.methods):  # few parameters: everything beside each other
-        shown = tabbed([grid("all", found, 1), table], "estimates")
-        return side_by_side("parameters", shown, running, shares=[1, 1])
+        return side_by_side("parameters", tabbed([grid("all", found, 1), table], "estimates"), running, shares=[1, 1])
     return tabbed([grid("all", found, 3 if len(found) <= 2 * FEW else 4), running, table], "parameters")
 
 

@@ -22,8 +22,7 @@ class Shelf:
         named = [path.strip("/") for path in paths]
         stripped = [path for path in named if not path.startswith(f"{SIZES}/")]
         self.sizes = {path: size.split("_") for _, size, path in (name.split("/", 2) for name in set(named) - set(stripped))}
-        numbered = sorted(path.split("/")[1:] for path in stripped if path.startswith("joints/"))
-        self.joints = [joint for _, joint in numbered]
+        self.joints = [joint for _, joint in sorted(path.split("/")[1:] for path in stripped if path.startswith("joints/"))]
         self.paths = sorted(stripped, key=self._place)
         self._ending: dict[tuple[int, str], list[tuple[str, list[str]]]] = {}
         for path in self.paths:  # an arm of seven joints has thousands of paths, and layouts ask a thousand times
@@ -73,8 +72,7 @@ def plot(shelf: Shelf, name: str, *patterns: str, legend: bool = False) -> Part:
         return None
     name += shelf.rms(found)
     linked = rrb.TimeAxis(link=rrb.components.LinkAxis.LinkToGlobal)
-    shown = rrb.PlotLegend(visible=legend)
-    return rrb.TimeSeriesView(name=name, contents=_contents(found), axis_x=linked, plot_legend=shown)
+    return rrb.TimeSeriesView(name=name, contents=_contents(found), axis_x=linked, plot_legend=rrb.PlotLegend(visible=legend))
 
 
 def window(shelf: Shelf, name: str, *patterns: str) -> Part:

@@ -39,8 +39,7 @@ class PanelAxis:
         """Return its ends, for data."""
         if self.limits is not None:
             return self.limits
-        own = [x[np.isfinite(x) & ((x > 0) | (not self.log))] for x in every]
-        values = np.concatenate([*own, np.empty(0)])
+        values = np.concatenate([*(x[np.isfinite(x) & ((x > 0) | (not self.log))] for x in every), np.empty(0)])
         if not len(values):
             return (0.1, 1.0) if self.log else (0.0, 1.0)
         low, high = float(values.min()), float(values.max())

@@ -94,8 +94,7 @@ def _told(fit: Fit) -> Iterator[str]:
     logged = isinstance(fit.processing.alignment, AsLogged)
     asked = fit.robot_model.asked
     if asked.hold or asked.tie:
-        known = (("held", asked.hold), ("tied", asked.tie))
-        yield "; ".join(f"{what}: {', '.join(words)}" for what, words in known if words)
+        yield "; ".join(f"{what}: {', '.join(words)}" for what, words in (("held", asked.hold), ("tied", asked.tie)) if words)
     if not fit.logs.fitted[0].poses:
         is_early = channel.delay < -NEGLIGIBLE / fit.logs.fitted[0].fs and not channel.lags
         early = f" (it is logged {1e3 * -channel.delay:.4g} ms after it acts)" if is_early else ""

@@ -67,8 +67,7 @@ def correlated(estimate: Estimate) -> list[tuple[str, str, float]]:
     R = C / np.outer(sigma, sigma)
     of_functions = [p.is_random_effect for p in estimate.problem.basis.parameters]
     R[of_functions], R[:, of_functions] = 0.0, 0.0
-    strong = np.argwhere(np.triu(np.abs(R), 1) > STRONG)
-    found = [(estimate.names[i], estimate.names[j], float(R[i, j])) for i, j in strong]
+    found = [(estimate.names[i], estimate.names[j], float(R[i, j])) for i, j in np.argwhere(np.triu(np.abs(R), 1) > STRONG)]
     if estimate.delay_covariance.any():
         of_delay = np.sqrt(np.maximum(np.diagonal(estimate.delay_covariance), 0.0)) / sigma
         found += [(estimate.names[k], DELAY, float(of_delay[k])) for k in np.flatnonzero(of_delay > STRONG)]

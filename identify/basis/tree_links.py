@@ -233,8 +233,7 @@ def tree_basis(tree: KinematicTree, laws: tuple[AbstractBlock, ...] = (ViscousFr
     blocks = TreeLinks(tree), OfJoints(Armature(), driven), *springs, *laws, *_of_couplings(tree, laws)
     parameters = [parameter for block in blocks for parameter in block.parameters(tree.n)]
     kept = tuple(sorted(parameters, key=lambda p: -1 if p.joint is None else p.joint))
-    slides = tuple(j for j, joint in enumerate(tree.joints) if joint.kind == "slide")
-    return Basis(tree.n, blocks, kept, slides)
+    return Basis(tree.n, blocks, kept, tuple(j for j, joint in enumerate(tree.joints) if joint.kind == "slide"))
 
 
 def _of_couplings(tree: KinematicTree, laws: tuple[AbstractBlock, ...]) -> Iterator[AbstractBlock]:

@@ -84,8 +84,7 @@ class BandedCovariance:
     @classmethod
     def of_variance(cls, variance: Array, kinds: int) -> Self:
         """Return the covariance of independent rows of that variance, shape (..., r)."""
-        by_kind = variance.reshape(*variance.shape[:-1], 1, -1, kinds)
-        return cls(by_kind[..., None] * np.eye(kinds))
+        return cls(variance.reshape(*variance.shape[:-1], 1, -1, kinds)[..., None] * np.eye(kinds))
 
     def __add__(self, other: Self) -> Self:
         few, many = sorted((self.bands, other.bands), key=lambda bands: bands.shape[-4])

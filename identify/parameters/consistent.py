@@ -90,8 +90,7 @@ def consistent_parameters(
         bodies = Bodies(parameters, given[columns], np.maximum(np.abs(given[columns]), least_change(K, sigma)))
         rest = (X - grouping.base(np.where(columns, 0.0, standard)))[rows]
         A = np.asarray(np.linalg.solve(own, np.column_stack([K, rest])), dtype=np.float64)
-        found = nearest(A[:, :-1], A[:, -1], bodies, weight)
-        standard[columns] = bodies.with_extent(found)
+        standard[columns] = bodies.with_extent(nearest(A[:, :-1], A[:, -1], bodies, weight))
     base, whole = grouping.base(standard), root @ root.T
     off = (base - X)[rows]
     distance = float(np.linalg.norm(np.linalg.solve(_root(whole[np.ix_(rows, rows)]), off))) if rows.any() else 0.0
@@ -101,8 +100,7 @@ def consistent_parameters(
 
 def least_change(K: Array, sigma: Array) -> Array:
     """Return the change of each standard parameter that moves a base value by its sigma, shape (p,); 1 where none does."""
-    size = np.abs(K) / sigma[:, None]
-    most = size.max(axis=0, initial=0.0)
+    most = (np.abs(K) / sigma[:, None]).max(axis=0, initial=0.0)
     return np.where(most > 0, 1 / np.where(most > 0, most, 1.0), 1.0)
 
 

@@ -59,8 +59,7 @@ def kinematic_tree(robot: Robot, couplings: Sequence[str] = ()) -> KinematicTree
             )
             parent = k
         last[body] = parent
-    weightless = model.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_GRAVITY)
-    gravity = np.zeros(3) if weightless else model.opt.gravity
+    gravity = np.zeros(3) if model.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_GRAVITY) else model.opt.gravity
     return KinematicTree(robot.name, tuple(joints), gravity, tuple(_couplings(robot, couplings)))
 
 

@@ -36,8 +36,7 @@ def sdf_text(robot: Robot, tree: KinematicTree, standard: Mapping[str, float]) -
 
 def _link(model: ElementTree.Element, link: PlacedLink) -> None:
     element = ElementTree.SubElement(model, "link", {"name": link.name})
-    pose = _text(element, "pose", numbers(np.concatenate([link.place, link.angles])))
-    pose.set("relative_to", link.parent)
+    _text(element, "pose", numbers(np.concatenate([link.place, link.angles]))).set("relative_to", link.parent)
     body = link.body if link.body is not None and link.body.mass > 0 else BALL
     inertial = ElementTree.SubElement(element, "inertial")
     _text(inertial, "pose", numbers(np.concatenate([body.centre, np.zeros(3)])))

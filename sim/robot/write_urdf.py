@@ -21,8 +21,7 @@ def urdf_text(name: str, robot: Robot, tree: KinematicTree, standard: Mapping[st
     moves, what is welded to it has none. Other robots become links and joints without shapes. Inertias of rotors stand in
     transmissions, where Drake and idbench read them.
     """
-    path = Robot.path(name)
-    text = path.read_text(encoding="utf-8")
+    text = Robot.path(name).read_text(encoding="utf-8")
     if mounting.plain and "<robot" in text:
         root, _ = parsed(text, comments=True)
         _rewrite(root, tree, standard)
@@ -79,8 +78,7 @@ def _bounded(link: PlacedLink) -> bool:
 
 
 def _transmission(root: ElementTree.Element, joint: str) -> ElementTree.Element | None:
-    own = (x for x in root.findall("transmission") for of in x.findall("joint") if of.get("name") == joint)
-    return next(own, None)
+    return next((x for x in root.findall("transmission") for of in x.findall("joint") if of.get("name") == joint), None)
 
 
 def _has_rotor(root: ElementTree.Element, joint: str) -> bool:

@@ -77,8 +77,7 @@ def draw_waypoint(
     if (low < high).all() and np.isfinite(ranges).all():
         for _ in range(DRAWS // BLOCK):
             before = rng.bit_generator.state
-            points = rng.uniform(low, high, (BLOCK, len(ranges)))
-            right = _far(points, neighbours, smallest_move).all(axis=-1)
+            right = _far(rng.uniform(low, high, (BLOCK, len(ranges))), neighbours, smallest_move).all(axis=-1)
             if right.any():
                 rng.bit_generator.state = before  # which has drawn no more than it took
                 return np.asarray(rng.uniform(low, high, (int(right.argmax()) + 1, len(ranges)))[-1])
@@ -132,8 +131,7 @@ class RandomMoves(AbstractTrajectory):
             points[k] = draw_waypoint(rng, ranges, neighbours, clearance, smallest)
         velocity = per_joint(self.velocity, robot.n, "trajectory.velocity")
         fastest = (PEAK_VELOCITY * np.abs(np.diff(points, axis=0)) / velocity).max(axis=1)
-        times = np.maximum(rng.uniform(*self.durations, self.moves), fastest)
-        return at_rest(points, times, self.rest)
+        return at_rest(points, np.maximum(rng.uniform(*self.durations, self.moves), fastest), self.rest)
 
 
 @settings
@@ -189,6 +187,5 @@ class RandomPace(AbstractTrajectory):
 
 def room(robot: Robot) -> Array:
     """Ranges of random motion, shape (joint, 2): their ranges, or half a turn or metre to either side."""
-    free = np.where(robot.slides, 0.5, np.pi)
-    around = robot.model.qpos0[:, None] + free[:, None] * [-1.0, 1.0]
+    around = robot.model.qpos0[:, None] + np.where(robot.slides, 0.5, np.pi)[:, None] * [-1.0, 1.0]
     return np.where(np.isfinite(robot.ranges), robot.ranges, around)
