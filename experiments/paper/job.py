@@ -17,7 +17,7 @@ from idbench.sim.robot.robot import Robot
 from idbench.sim.scenario.scenario import Scenario
 from idbench.sim.scenario.scenario_file import load
 from idbench.sim.trajectories import Quintic
-from idbench.sim.trajectories.quintic import draw_waypoint
+from idbench.sim.trajectories.quintic import draw_waypoint, draw_waypoints
 
 PAPER_CONDITION = {MODELS.create(name): PAPER[name].condition_number for name in ("explicit", "power")}
 """Cond(W) of the paper's Table 1; that of the implicit model is the explicit one's."""
@@ -65,11 +65,12 @@ class TrajectorySearch:
         """Return the scenario found; ExperimentError if the rounds end before the tolerance is reached."""
         rng = np.random.default_rng(self.seed)
         durations = self._durations(rng)
-        best, distance = self._scenario(robot, self._drawn(rng, robot), durations), inf
+        points = draw_waypoints(rng, MOVES + 1, robot.ranges, self.clearance, self.smallest_move)
+        best, distance = self._scenario(robot, points, durations), inf
         excess = self.excess(robot, best)
         for number in range(self.rounds):
-            points = [self._redrawn(rng, robot, np.array(best.quintic().waypoints)) for _ in range(CANDIDATES)]
-            others = [self._scenario(robot, p, durations) for p in points]
+            redrawn = [self._redrawn(rng, robot, np.array(best.quintic().waypoints)) for _ in range(CANDIDATES)]
+            others = [self._scenario(robot, points, durations) for points in redrawn]
             if excess > 0:
                 best, excess = min([(best, excess), *((o, self.excess(robot, o)) for o in others)], key=lambda pair: pair[1])
             else:
@@ -120,19 +121,11 @@ class TrajectorySearch:
         shares = rng.uniform(0.85, 1.15, MOVES)
         return np.diff(np.rint(np.cumsum(shares) / shares.sum() * MOTION * FS), prepend=0.0) / FS
 
-    def _drawn(self, rng: np.random.Generator, robot: Robot) -> Array:
-        points = np.zeros((MOVES + 1, robot.n))
-        for k in range(MOVES + 1):
-            points[k] = self._waypoint(rng, robot, points[max(k - 1, 0) : k])
-        return points
-
     def _redrawn(self, rng: np.random.Generator, robot: Robot, points: Array) -> Array:
         k = int(rng.integers(len(points)))
-        points[k] = self._waypoint(rng, robot, np.delete(points, k, axis=0)[max(k - 1, 0) : k + 1])
+        neighbours = np.delete(points, k, axis=0)[max(k - 1, 0) : k + 1]
+        points[k] = draw_waypoint(rng, robot.ranges, neighbours, self.clearance, self.smallest_move)
         return points
-
-    def _waypoint(self, rng: np.random.Generator, robot: Robot, neighbours: Array) -> Array:
-        return draw_waypoint(rng, robot.ranges, neighbours, self.clearance, self.smallest_move)
 
     def _scenario(self, robot: Robot, points: Array, durations: Array) -> Scenario:
         waypoints = tuple(tuple(float(x) for x in point) for point in points)

@@ -96,6 +96,16 @@ def draw_waypoint(
     )
 
 
+def draw_waypoints(
+    rng: np.random.Generator, count: int, ranges: Array, clearance: Array | float, smallest_move: Array | float
+) -> Array:
+    """Return as many random waypoints, one after the other [rad], shape (waypoint, joint); all else as of `draw_waypoint`."""
+    points = np.zeros((count, len(ranges)))
+    for k in range(count):
+        points[k] = draw_waypoint(rng, ranges, points[max(k - 1, 0) : k], clearance, smallest_move)
+    return points
+
+
 @settings
 class RandomMoves(AbstractTrajectory):
     """Fifth-order moves between random waypoints in random times."""
@@ -121,14 +131,11 @@ class RandomMoves(AbstractTrajectory):
 
     def plan(self, robot: Robot) -> PointToPoint:
         """Draw waypoints and times; every joint moves in every move."""
-        rng, points = np.random.default_rng(self.seed), np.zeros((self.moves + 1, robot.n))
-        ranges = room(robot)
+        rng, ranges = np.random.default_rng(self.seed), room(robot)
         width = np.diff(ranges, axis=1)[:, 0]
         clearance = np.minimum(0.2, width / 10) if self.clearance is None else self.clearance
         smallest = np.minimum(0.4, width / 4) if self.smallest_move is None else self.smallest_move
-        for k in range(self.moves + 1):
-            neighbours = points[max(k - 1, 0) : k]
-            points[k] = draw_waypoint(rng, ranges, neighbours, clearance, smallest)
+        points = draw_waypoints(rng, self.moves + 1, ranges, clearance, smallest)
         velocity = per_joint(self.velocity, robot.n, "trajectory.velocity")
         fastest = (PEAK_VELOCITY * np.abs(np.diff(points, axis=0)) / velocity).max(axis=1)
         return at_rest(points, np.maximum(rng.uniform(*self.durations, self.moves), fastest), self.rest)
@@ -176,9 +183,7 @@ class RandomPace(AbstractTrajectory):
         middle, half = ranges.mean(axis=1), np.diff(ranges, axis=1)[:, 0] / 2 - self.clearance
         reach = half * rng.uniform(0.2, 1.0, robot.n)
         around = np.stack([middle - reach, middle + reach], axis=1) + (rng.uniform(-1, 1, robot.n) * (half - reach))[:, None]
-        points = np.zeros((count + 1, robot.n))
-        for k in range(count + 1):
-            points[k] = draw_waypoint(rng, around, points[max(k - 1, 0) : k], 0.0, self.smallest_move)
+        points = draw_waypoints(rng, count + 1, around, 0.0, self.smallest_move)
         found = at_rest(points, self.shortest + np.diff(edges) * self.period, self.rest)
         if (fastest := float(found.peak_velocity.max())) > self.velocity:
             raise ScenarioError(f"seed {self.seed} draws a motion of {fastest:.3g} rad/s, above velocity = {self.velocity:g}")
