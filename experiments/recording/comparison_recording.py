@@ -36,12 +36,9 @@ from idbench.sim.scenario.scenario_file import to_toml
 
 def record_table1(table: Table1, audience: Audience | None = None) -> list[tuple[str, Stream]]:
     """Return the streams of the recording of `table`, by the name of their file."""
-    log = table.log
-    reference = table.reference
-    scenario = table.scenario
-    base = Base(
-        recording_id(scenario.name, to_toml(scenario).encode()), table.robot, log.fs, ("measured",), reference.qd, audience
-    )
+    log, reference, scenario = table.log, table.reference, table.scenario
+    name = recording_id(scenario.name, to_toml(scenario).encode())
+    base = Base(name, table.robot, log.fs, ("measured",), reference.qd, audience)
     base.stream.describe(scenario=to_toml(scenario), seed=str(scenario.seed), fs_hz=f"{log.fs:g}")
     base.replay(log, {"q/planned": reference.q, "qd/planned": reference.qd, "qdd/planned": reference.qdd}, reference.qd)
     base.arm.trace(log.q)
@@ -184,13 +181,10 @@ def _restyle(stream: Stream, run: Compared, number: int, copied: AbstractSet[str
     """Give the curves of a run colours and names of its own; the second one's lie thin over the first one's."""
     for path in sorted(copied):
         match path.split("/"):
-            case ["versus", _, *signal]:
-                colors = [lighter(color, 2) for color in joint_colors(run.log.n)]
-                names = [f"{signal[-1]} {j + 1}, {run.name}" for j in range(run.log.n)]
-                stream.style(path, names, colors, 1.2)
-            case [*signal] if path in SIGNALS:
-                names = [f"{signal[-1]} {j + 1}, {run.name}" for j in range(run.log.n)]
-                stream.style(path, names, joint_colors(run.log.n), 4.0)
+            case [head, *_, kind] if head == "versus" or path in SIGNALS:
+                fade, width = (2, 1.2) if head == "versus" else (0, 4.0)
+                names = [f"{kind} {j + 1}, {run.name}" for j in range(run.log.n)]
+                stream.style(path, names, [lighter(color, fade) for color in joint_colors(run.log.n)], width)
             case ["identify", _, *_, "lines" | "marks" | "segments" | "legend", name] if _model(name, run):
                 stream.keep(path, rr.LineStrips2D.from_fields(colors=[model_color(_model(name, run), number)]))
             case ["identify", _, model, "predicted" | "residual", _]:

@@ -109,10 +109,10 @@ def keys(shelf: Shelf, *patterns: str) -> Part:
 
 def text(shelf: Shelf, *patterns: str) -> Part:
     """Return the texts, one behind the other, if there are any."""
-    titles = {
-        path: path.split("/")[1] if path.startswith(("identify/", "attribution/")) else path for path in shelf.of(*patterns)
-    }
-    found = [rrb.TextDocumentView(origin=f"/{path}", name=title) for path, title in titles.items()]
+    found = [
+        rrb.TextDocumentView(origin=f"/{path}", name=path.split("/")[1] if "/" in path else path)
+        for path in shelf.of(*patterns)
+    ]
     return rrb.Tabs(*found, active_tab=len(found) - 1, name="texts") if len(found) > 1 else next(iter(found), None)
 
 
