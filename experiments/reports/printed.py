@@ -49,10 +49,9 @@ def _grid(table: EstimatesTable, width: int, *, complete: bool) -> Table:
     """Return the table of the parameters, and of the fit as a whole if it shall be complete."""
     heads, rows = [f"{first}\n{second}" for first, second in table.heads], list(table.rows())
     if len(table.estimates) == 1:
-        plain = ["", "value", "unit", "%sigma"] if table.fit.truth is None else ["", "unit", "true", "value", "%e", "%sigma"]
-        if table.fit.truth is None:
-            rows = [[name, value, unit, share] for name, unit, value, share in rows]
-        return _beside(plain, rows, width)
+        if table.fit.truth is not None:
+            return _beside(["", "unit", "true", "value", "%e", "%sigma"], rows, width)
+        return _beside(["", "value", "unit", "%sigma"], [[name, x, unit, share] for name, unit, x, share in rows], width)
     grid = new_table("", heads)
     for cells in rows:
         grid.add_row(*cells)
