@@ -173,9 +173,7 @@ def _placement(model: mujoco.MjModel, body: int) -> tuple[int, Array, Array]:
 
 def _inertial(model: mujoco.MjModel, link: int) -> tuple[Array, Array, float]:
     """Return inertia matrix and first moments about the origin of a link's frame, and its mass."""
-    inertia = np.zeros((3, 3))
-    first = np.zeros(3)
-    mass = 0.0
+    inertia, first, mass = np.zeros((3, 3)), np.zeros(3), 0.0
     for body, position, rotation in _welded(model, link):
         m, c = float(model.body_mass[body]), position + rotation @ model.body_ipos[body]
         axes = rotation @ _rotation(model.body_iquat[body])
