@@ -69,9 +69,7 @@ class Clearance:
     def bare(self) -> tuple[str, ...]:
         """Names of links that have no shape, and of height fields, whose distances MuJoCo does not tell."""
         m = self._model
-        links = (
-            {int(m.body_weldid[b]) for b in range(1, m.nbody)} - {0} - set(m.body_weldid[m.geom_bodyid[self.shapes]].tolist())
-        )
+        links = set(m.body_weldid[1:].tolist()) - {0} - set(m.body_weldid[m.geom_bodyid[self.shapes]].tolist())
         fields = np.flatnonzero(m.geom_type == int(mujoco.mjtGeom.mjGEOM_HFIELD))
         return (*(body_name(m, link) for link in sorted(links)), *(m.geom(int(g)).name or "a height field" for g in fields))
 
@@ -129,10 +127,7 @@ class Clearance:
         for k, posture in enumerate(q):
             d.qpos[:] = posture
             mujoco.mj_kinematics(m, d)
-            pos[k] = d.geom_xpos
-            mat[k] = d.geom_xmat
-            axis[k] = d.xaxis
-            anchor[k] = d.xanchor
+            pos[k], mat[k], axis[k], anchor[k] = d.geom_xpos, d.geom_xmat, d.xaxis, d.xanchor
         return pos, mat, axis, anchor
 
     def _gaps(self, pos: Array, mat: Array) -> Array:
@@ -167,8 +162,7 @@ class Clearance:
         The sum of (1 - distance / margin)^2 over instants and pairs that are nearer than a margin beyond the least distance.
         """
         pos, mat, axis, anchor = self._centres(q)
-        total = 0.0
-        slope = np.zeros_like(q)
+        total, slope = 0.0, np.zeros_like(q)
         near = self._gaps(pos, mat) < self._margin
         hinge = ~self._robot.slides
         for k in np.flatnonzero(near.any(axis=1)):

@@ -101,10 +101,8 @@ class _Values:
     @property
     def slides(self) -> bool:
         if (sigma := self._joint.get("sigma", 0)) not in (0, 1) or isinstance(sigma, bool):
-            raise RobotError(
-                f"{self._path}: joint {self._name}: sigma = {self._joint['sigma']!r} must be 0 (turns) or 1 (slides)"
-            )
-        return bool(self._joint.get("sigma", 0))
+            raise RobotError(f"{self._path}: joint {self._name}: sigma = {sigma!r} must be 0 (turns) or 1 (slides)")
+        return bool(sigma)
 
     @property
     def range(self) -> list[float] | None:

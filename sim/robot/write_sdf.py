@@ -47,9 +47,8 @@ def _link(model: ElementTree.Element, link: PlacedLink) -> None:
 
 
 def _joint(model: ElementTree.Element, link: PlacedLink) -> None:
-    joint = ElementTree.SubElement(
-        model, "joint", {"name": link.joint.name, "type": "prismatic" if link.joint.kind == "slide" else "revolute"}
-    )
+    kind = "prismatic" if link.joint.kind == "slide" else "revolute"
+    joint = ElementTree.SubElement(model, "joint", {"name": link.joint.name, "type": kind})
     _text(joint, "parent", link.parent)
     _text(joint, "child", link.name)
     axis = ElementTree.SubElement(joint, "axis")
