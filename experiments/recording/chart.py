@@ -94,9 +94,8 @@ class Chart:
     def marks(self, name: str, x: Array, y: Array, color: Color, symbol: Symbol = "circle") -> None:
         """Draw values as symbols."""
         where, shape = self._where(x, y), SIZE * np.array(_TURNS[symbol])
-        self._strips(
-            f"marks/{part(name)}", [at + shape for at in where[np.isfinite(where).all(axis=1)]], color, 1.0, MARK_ORDER
-        )
+        strips = [at + shape for at in where[np.isfinite(where).all(axis=1)]]
+        self._strips(f"marks/{part(name)}", strips, color, 1.0, MARK_ORDER)
 
     def write(self, name: str, x: Array, y: Array, texts: Sequence[str], color: Color = TEXT) -> None:
         """Write at values."""

@@ -57,9 +57,8 @@ class Arm:
     def trace(self, q: Array) -> None:
         """Draw the way of every site along `q` [rad], shape (time, joint)."""
         for site, position in Mover(self._robot).at(q).sites.items():
-            self._stream.keep(
-                f"world/path_of_{part(site)}", rr.LineStrips3D([position], radii=[0.0015], colors=[[190, 190, 190]])
-            )
+            line = rr.LineStrips3D([position], radii=[0.0015], colors=[[190, 190, 190]])
+            self._stream.keep(f"world/path_of_{part(site)}", line)
 
 
 def _drawn(shape: SceneShape, wire: Color | None) -> rr.AsComponents:

@@ -178,10 +178,8 @@ def _told_figure(found: Excited) -> str:
     names, shares = found.design.robot_model.basis.names, 100 * found.shares
     figure = Figure(figsize=(11, 0.13 * len(names) + 1.1), layout="constrained")
     panel = figure.subplots()
-    d = found.design
-    image = panel.imshow(
-        shares.T, aspect="auto", cmap="viridis", vmin=0, extent=(0, d.duration, len(names) - 0.5, -0.5), interpolation="nearest"
-    )
+    extent = (0, found.design.duration, len(names) - 0.5, -0.5)
+    image = panel.imshow(shares.T, aspect="auto", cmap="viridis", vmin=0, extent=extent, interpolation="nearest")
     panel.set_yticks(np.arange(len(names)), names, fontsize=6)
     panel.set_xlabel("time [s]")
     panel.grid(visible=False)

@@ -108,14 +108,13 @@ def spectra_figure(fit: Fit) -> str:
     panels = list[Panel]()
     for found in every:
         top = float(found.lines[form].max())
-        panel = Panel(
-            f"{found.row} [{found.unit}/\u221aHz]", PanelAxis(log=True), PanelAxis(log=True, limits=(top * 1e-5, top * 3))
-        )
+        ends = top * 1e-5, top * 3
+        panel = Panel(f"{found.row} [{found.unit}/\u221aHz]", PanelAxis(log=True), PanelAxis(log=True, limits=ends))
         for name, density in found.lines.items():
             color, dash = NOISES.get(name, (color_of(form), ""))
             panel.line(found.f, density, color, 1.0, "residual" if name == form else name, dash)
         for cutoff in cutoffs(fit.processing, fit.logs.fitted[0].fs).values():
-            panel.line(np.array([cutoff, cutoff]), np.array([top * 1e-5, top * 3]), "#cccccc")
+            panel.line(np.array([cutoff, cutoff]), np.array(ends), "#cccccc")
         panels.append(panel)
     return figure(panels, 1.6, "frequency [Hz]")
 

@@ -195,7 +195,6 @@ def _ranges(fit: Fit) -> Iterator[list[str]]:
 def _logs(fit: Fit) -> Iterator[list[Any]]:
     errors = next(iter(fit.torque_errors.values()), None)
     for k, log in enumerate(fit.logs.fitted):
-        name = fit.logs.name(k)
         torque = f"{log.torque.meaning}, delay {log.torque.late}"
         left = [] if errors is None else [f"{x:.2g}" for x in errors[k]]
-        yield [name, f"{log.fs:.5g}", f"{log.samples / log.fs:.4g}", torque, *left]
+        yield [fit.logs.name(k), f"{log.fs:.5g}", f"{log.samples / log.fs:.4g}", torque, *left]

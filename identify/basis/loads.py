@@ -88,9 +88,7 @@ class PayloadLink(AbstractConservativeBlock, AbstractColumns):
         share = state.condition(HELD_SHARE)[..., 0, :]
         if not np.any(share):
             return {}
-        return {
-            (row, _own(parameter)): share * column for (row, parameter), column in self._links.columns(function, state).items()
-        }
+        return {(row, _own(p)): share * column for (row, p), column in self._links.columns(function, state).items()}
 
     @cached_property
     def _links(self) -> TreeLinks:
