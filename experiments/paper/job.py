@@ -64,7 +64,9 @@ class TrajectorySearch:
     def run(self, robot: Robot, progress: Searching | None = None) -> Scenario:
         """Return the scenario found; ExperimentError if the rounds end before the tolerance is reached."""
         rng = np.random.default_rng(self.seed)
-        durations = self._durations(rng)
+        shares = rng.uniform(0.85, 1.15, MOVES)
+        # Whole samples, as the paper's plan of 100 Hz has them; together the motion's time.
+        durations = np.diff(np.rint(np.cumsum(shares) / shares.sum() * MOTION * FS), prepend=0.0) / FS
         points = draw_waypoints(rng, MOVES + 1, robot.ranges, self.clearance, self.smallest_move)
         best, distance = self._scenario(robot, points, durations), inf
         excess = self.excess(robot, best)
@@ -115,11 +117,6 @@ class TrajectorySearch:
         torque = np.abs(ideal_log(robot, scenario.quintic().points.sample(FS)).tau).max(axis=0)
         used = np.concatenate([scenario.quintic().points.peak_velocity / self.velocity, torque / robot.torque_limits])
         return float(used.max() - 1)
-
-    def _durations(self, rng: np.random.Generator) -> Array:
-        """Return the times of the moves: whole samples, as the paper's plan of 100 Hz has them; together the motion's."""
-        shares = rng.uniform(0.85, 1.15, MOVES)
-        return np.diff(np.rint(np.cumsum(shares) / shares.sum() * MOTION * FS), prepend=0.0) / FS
 
     def _redrawn(self, rng: np.random.Generator, robot: Robot, points: Array) -> Array:
         k = int(rng.integers(len(points)))

@@ -118,8 +118,7 @@ class Table1Motions:
     def _kept(self, found: Sequence[tuple[Array, Array]]) -> Errors:
         """Return the errors of motions whose condition numbers are the paper's."""
         paper = np.array([column.condition_number for column in PAPER.values()])
-        near = [(c, e) for c, e in found if (np.abs(np.log(c / paper)) <= np.log1p(self.tolerance)).all()]
-        if not near:
+        if not (near := [(c, e) for c, e in found if (np.abs(np.log(c / paper)) <= np.log1p(self.tolerance)).all()]):
             raise ExperimentError(
                 f"none of {len(found)} motions has the paper's condition numbers within {self.tolerance:.0%}: "
                 "draw more (--motions)"

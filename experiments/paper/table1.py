@@ -89,7 +89,8 @@ PAPER: Mapping[str, Table1Column] = {
 
 def settled(name: str, rest: float, fs: float, torque: TorqueChannel) -> Chain:
     """Return the chain `name`, its filters settling while the robot rests so long; raise ExperimentError if they do not."""
-    if (halo := (chain := CHAINS.create(name)).halo(fs, torque)) > rest:
+    chain = CHAINS.create(name)
+    if (halo := chain.halo(fs, torque)) > rest:
         raise ExperimentError(f"rest = {rest:g} s is shorter than the {halo:.3g} s that chain {name} looks: raise it")
     return replace(chain, trim=rest)
 
@@ -132,9 +133,10 @@ class Table1:
 
     @cached_property
     def estimates(self) -> dict[str, dict[str, Estimate]]:
-        """The estimate of every form, by chain."""
-        rest, log = self.scenario.quintic().rest, self.log
-        return {name: self._identified(settled(name, rest, log.fs, log.torque)) for name in self.chains}
+        """The estimate of every form, by chain; two are integrated: energy (Eq. 11, 20), and integral (after Eq. 9)."""
+        log, rest, models = self.log, self.scenario.quintic().rest, {name: MODELS.create(name) for name in MODELS}
+        chains = {name: settled(name, rest, log.fs, log.torque) for name in self.chains}
+        return {name: identify_each(log, scara(), models, chain, OrdinaryLeastSquares()) for name, chain in chains.items()}
 
     @property
     def rates(self) -> dict[str, Rates]:
@@ -161,10 +163,6 @@ class Table1:
             "models": by_chain[main],
             **{f"{name}_chain": by_chain[name] for name in others},
         }
-
-    def _identified(self, chain: Chain) -> dict[str, Estimate]:
-        """Return the estimates of the three models, and of two integrated ones: energy (Eq. 11, 20), integral (after Eq. 9)."""
-        return identify_each(self.log, scara(), {name: MODELS.create(name) for name in MODELS}, chain, OrdinaryLeastSquares())
 
 
 OVER = {"energy": "power", "integral": "implicit"}  # Models that are others, integrated
