@@ -101,8 +101,7 @@ def differences(runs: Sequence[Compared]) -> str:
     """Settings that differ, as a markdown table."""
     every = [run.settings for run in runs]
     keys = dict.fromkeys(key for settings in every for key in settings)
-    differing = [key for key in keys if len({json.dumps(s.get(key), sort_keys=True) for s in every}) > 1]
-    if not differing:
+    if not (differing := [key for key in keys if len({json.dumps(s.get(key), sort_keys=True) for s in every}) > 1]):
         return "**Nothing differs** in what was simulated and how it was identified."
     rows = [f"| {key} | {' | '.join(_shown(s.get(key)) for s in every)} |" for key in differing]
     head = [f"| setting | {' | '.join(run.name for run in runs)} |", "|---|" + "---|" * len(runs)]

@@ -138,16 +138,14 @@ def compare(folders: Sequence[Path], tab: str, out: Path) -> None:
 
 def _copy(stream: Stream, run: Compared, number: int, shift: float) -> None:
     """Send what a run's recording holds: all of the first one's; of others signals and identifications, by the run's name."""
-    paths = files(run.folder)
-    if not paths:
+    if not (paths := files(run.folder)):
         raise ResultsError(f"there is no recording in {run.folder}: run it without --no-rerun")
     labels = [path for path in paths if path.name not in (BASE, INNER)]
     copied = set[str]()
     for reader in map(RrdReader, reversed(paths)):
         chunks = [chunk for entry in reader.recordings() for chunk in reader.stream(store=entry).to_chunks()]
         for chunk in chunks:
-            place = _place(chunk.entity_path.strip("/"), run.name, number, len(labels) > 1)
-            if place is not None:
+            if (place := _place(chunk.entity_path.strip("/"), run.name, number, len(labels) > 1)) is not None:
                 stream.add(_moved(chunk, shift).with_entity_path(f"/{place}"), place)
                 copied.add(place)
     _restyle(stream, run, number, copied)

@@ -117,10 +117,10 @@ class Layer:
                 if not len(used):  # a joint that never moves
                     continue
                 path, colors = f"{at}/columns/{row}", [JOINTS[p % len(JOINTS)] for p in used]
-                self.stream.style(path, [estimate.names[p] for p in used], colors)
+                of = [estimate.names[p] for p in used]
+                self.stream.style(path, of, colors)
                 self.stream.curves(path, [seconds(found.time[rows])], W[rows][:, used])
-                keys = {estimate.names[p]: color for p, color in zip(used, colors, strict=True)}
-                send_keys(self.stream, f"{path}/keys", keys)
+                send_keys(self.stream, f"{path}/keys", dict(zip(of, colors, strict=True)))
 
     def _running(self, at: str, form: str, estimate: Estimate, color: Color) -> None:
         """Send the estimate as it comes about, with its variance, once that is small enough to be worth a look."""

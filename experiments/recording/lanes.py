@@ -87,8 +87,7 @@ class Lanes:
             self.stream.keep(path, rr.StateConfiguration(values=list(STATES), labels=nothing, colors=list(STATES.values())))
         now = np.concatenate([[self._last.get(path, "")], states])
         self._last[path] = str(now[-1])
-        changed = np.flatnonzero(now[1:] != now[:-1])
-        if len(changed):
+        if len(changed := np.flatnonzero(now[1:] != now[:-1])):
             self.stream.send(path, time_columns(t[changed], self.fs), rr.StateChange.columns(state=now[1 + changed].tolist()))
 
 

@@ -68,7 +68,7 @@ def start_viewer() -> str:
 
 def _start(options: list[str], port: int) -> "subprocess.Popen[bytes]":
     quiet, binary = subprocess.DEVNULL, viewer_binary()
-    words = [binary, "--bind", LOOPBACK, *options]
+    words = [str(binary), "--bind", LOOPBACK, *options]
     try:
         viewer = subprocess.Popen(words, stdin=quiet, stdout=quiet, stderr=quiet, start_new_session=True)
     except OSError as error:
