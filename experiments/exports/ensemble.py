@@ -208,8 +208,7 @@ class Ensemble:
         """
         robot, log, qd = held.driven(self.model)
         samples = round(LENGTH * log.fs)
-        count = log.samples // samples
-        if count < 1:
+        if (count := log.samples // samples) < 1:
             raise IdentificationError(f"a log of {log.samples / log.fs:.3g} s has no run of {LENGTH:g} s")
         first = samples * np.unique(np.linspace(0, count - 1, min(count, STRETCHES)).astype(np.intp))
         draws, fields = len(next(iter(standard.values()))), fields_of(robot, standard)

@@ -60,8 +60,7 @@ def residuals_figure(one: HeldOut) -> str:
 
 def causes_figure(fit: Fit) -> str:
     """Return residuals of the fit where each mistake that they show explains most of them, and what it explains."""
-    every = [(cause, x) for cause in fit.diagnosis or () if (x := cause.suspect.explained) is not None]
-    if not every:
+    if not (every := [(cause, x) for cause in fit.diagnosis or () if (x := cause.suspect.explained) is not None]):
         return ""
     rows, X = fit.problem.explicit.rows, fit.estimates[fit.leading].X
     residual, panels = rows.Y - rows.predicted(X), list[Panel]()

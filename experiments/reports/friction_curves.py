@@ -137,8 +137,7 @@ class FrictionCurves:
     def _loads(self, j: int) -> list[float]:
         """Return the loads at which a law of a joint is drawn: one, if it depends on none."""
         own = [block for block in self._laws[0].blocks if not isinstance(block, OfJoints) or j in block.joints]
-        law = next((law for law in map(block_of_all_joints, own) if isinstance(law, LoadFriction)), None)
-        if law is None:
+        if (law := next((law for law in map(block_of_all_joints, own) if isinstance(law, LoadFriction)), None)) is None:
             return [0.0]
         return [float(x) for x in np.quantile(np.abs(law.load(self.fit.problem.signals[0].state)[j]), LOADS)]
 

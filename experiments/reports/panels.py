@@ -48,9 +48,8 @@ class PanelAxis:
 
     def numbers(self, low: float, high: float) -> dict[float, str]:
         """Round numbers on it, and their texts."""
-        if self.log:
-            return {x: f"{x:g}" for x in decade_values(low, high).tolist()}
-        return {x: f"{x:.6g}" for x in round_values(low, high).tolist()}
+        values = decade_values(low, high) if self.log else round_values(low, high)
+        return {x: f"{x:g}" for x in values.tolist()}
 
 
 @dataclass

@@ -184,8 +184,7 @@ def _noise(fit: Fit) -> str:
     torque, position = (" ".join("?" if x is None else f"{x:.2g}" for x in fit.noise[kind]) for kind in ("torque", "position"))
     force, length = all_units(fit.robot_model)
     words = f"white noise of the log: torque {torque} {force}, position {position} {length}"
-    steps = fit.noise["encoder_step"]
-    if not any(steps):
+    if not any(steps := fit.noise["encoder_step"]):
         return words
     each = zip(steps, fit.robot_model.tree.joints, strict=True)
     bits = " ".join("-" if joint.kind == "slide" else f"{log2(2 * pi / step):.1f}" if step else "?" for step, joint in each)
