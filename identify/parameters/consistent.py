@@ -82,7 +82,9 @@ def consistent_parameters(
     """
     root, given = _root(covariance), _sized(grouping, X, covariance, np.array(given, dtype=np.float64))
     rows, columns = _touched(grouping, X)
-    standard = _as_estimated(grouping, X, given, columns)
+    standard, alone = given.copy(), np.flatnonzero(~columns)  # as estimated what no constraint touches, as given the others
+    which = np.abs(grouping.K[:, alone]).argmax(axis=0)
+    standard[alone] = X[which] / grouping.K[which, alone]
     if rows.any():
         K = grouping.K[np.ix_(rows, columns)]
         own, sigma = _root(covariance[np.ix_(rows, rows)]), np.sqrt(np.diagonal(covariance))[rows]
@@ -136,15 +138,6 @@ def _touched(grouping: BaseParameters, X: Array) -> tuple[npt.NDArray[np.bool_],
         if alone and (parameter.kind not in NOT_NEGATIVE or X[i] / grouping.K[i, k] >= 0):
             rows[i], columns[k] = False, False
     return rows, columns
-
-
-def _as_estimated(grouping: BaseParameters, X: Array, given: Array, columns: npt.NDArray[np.bool_]) -> Array:
-    """Return standard parameters: as estimated what no constraint touches, as given the others."""
-    standard = given.copy()
-    for k in np.flatnonzero(~columns):
-        i = int(np.abs(grouping.K[:, k]).argmax())
-        standard[k] = X[i] / grouping.K[i, k]
-    return standard
 
 
 def _root(covariance: Array) -> Array:
