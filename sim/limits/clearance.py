@@ -47,7 +47,8 @@ class Clearance:
         self._model = robot.model
         self._data = mujoco.MjData(robot.model)
         self._fromto, self.least = np.zeros(6), least
-        self.pairs = self._asked()
+        asked, of = combinations(self.shapes, 2), robot.model.geom_bodyid.tolist()
+        self.pairs = np.array([pair for pair in asked if not self._neighbours(*(of[g] for g in pair))], np.intp).reshape(-1, 2)
         random = np.random.default_rng(SEED).uniform(ranges[:, 0], ranges[:, 1], (ALWAYS, robot.n))
         most = self.distances(random, least + ROOM).max(axis=0, initial=-np.inf)
         always = most < least
@@ -87,12 +88,6 @@ class Clearance:
             first = m.body_jntadr[body]
             moved[first : first + m.body_jntnum[body], body] = m.body_jntnum[body] > 0
         return moved
-
-    def _asked(self) -> npt.NDArray[np.intp]:
-        """Return the pairs of shapes that joints move against each other, without those of neighbouring links."""
-        m = self._model
-        pairs = [pair for pair in combinations(self.shapes, 2) if not self._neighbours(*(int(m.geom_bodyid[g]) for g in pair))]
-        return np.array(pairs, dtype=np.intp).reshape(-1, 2)
 
     def _neighbours(self, one: int, two: int) -> bool:
         """True if two bodies belong to one link, or to two with a joint between them; what stands around is nobody's."""

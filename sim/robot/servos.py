@@ -23,7 +23,6 @@ STEP = 5e-4
 EARLY = 1.3
 """Steps by which a command acts early: force acts from half a step before, the rate limit moves on before that. Measured."""
 
-
 NO_DRIVE = ("armature", "damping", "frictionloss", "stiffness", "margin", "ref", "springref")
 """What a joint that is free play has none of, whatever the defaults of the file are."""
 

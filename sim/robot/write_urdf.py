@@ -89,13 +89,11 @@ def _has_rotor(root: ElementTree.Element, joint: str) -> bool:
 def _drive(root: ElementTree.Element, joint: str, rotor: float) -> None:
     """Give a joint a motor with a rotor, as seen at the joint; in the transmission that it has, if it has one."""
     root.set("xmlns:drake", DRAKE)
-    transmission = _transmission(root, joint)
-    if transmission is None:
+    if (transmission := _transmission(root, joint)) is None:
         transmission = ElementTree.SubElement(root, "transmission", {"name": f"{joint}_transmission"})
         ElementTree.SubElement(transmission, "type").text = "transmission_interface/SimpleTransmission"
         ElementTree.SubElement(transmission, "joint", {"name": joint})
-    actuator = transmission.find("actuator")
-    if actuator is None:
+    if (actuator := transmission.find("actuator")) is None:
         actuator = ElementTree.SubElement(transmission, "actuator", {"name": f"{joint}_motor"})
     for tag, value in ((ROTOR_INERTIA, rotor), (GEAR_RATIO, 1.0)):
         found = next((x for x in actuator if x.tag == tag), None)  # to find() a prefix is one that is declared

@@ -43,8 +43,6 @@ class Quintic(AbstractTrajectory):
 
 
 DRAWS = 10000  # Draws of all joints, and then of single ones, after which no waypoint is believed to exist
-
-
 BLOCK = 50  # Draws that are looked at together
 
 
