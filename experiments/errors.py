@@ -21,7 +21,6 @@ class StudyError(ExperimentError):
 CONTROL = {code: f"\\x{code:02x}" for code in (*range(32), *range(127, 160)) if chr(code) not in "\n\t"}
 """Control characters, and what is printed in their place."""
 
-
 LONGEST = 160  # Characters of a name that are shown
 
 

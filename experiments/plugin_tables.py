@@ -3,17 +3,7 @@
 from typing import Any
 
 from idbench.experiments.excite.excitation import EXCITATIONS
-from idbench.identify import (
-    ALIGNMENTS,
-    BLOCKS,
-    CHAINS,
-    DIFFERENTIATORS,
-    ESTIMATORS,
-    MASKS,
-    MODELS,
-    OPERATORS,
-    PREFILTERS,
-)
+from idbench.identify import ALIGNMENTS, BLOCKS, CHAINS, DIFFERENTIATORS, ESTIMATORS, MASKS, MODELS, OPERATORS, PREFILTERS
 from idbench.identify.plugins import PluginTable, Table
 from idbench.sim.scenario.scenario_file import KINDS
 

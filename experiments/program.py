@@ -8,9 +8,8 @@ from pathlib import Path
 @cache
 def program() -> str:
     """Command that runs it: environments of a clone lie beside its pyproject.toml."""
-    beside = Path(sys.prefix).parent / "pyproject.toml"
     try:
-        cloned = 'name = "idbench"' in beside.read_text(encoding="utf-8")
+        cloned = 'name = "idbench"' in (Path(sys.prefix).parent / "pyproject.toml").read_text(encoding="utf-8")
     except (OSError, ValueError):  # ValueError: of another project, in another encoding
         cloned = False
     return "uv run idbench" if cloned else "idbench"

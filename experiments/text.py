@@ -158,15 +158,12 @@ def print_table(console: Console, grid: Table, stub: int = 1) -> None:
     Columns with the same first line of their heading stay together; the first `stub` columns stand in every part.
     """
     groups = [list(group) for _, group in groupby(grid.columns[stub:], lambda column: str(column.header).partition("\n")[0])]
+    free = console.options.update(max_width=10_000)
     while groups:
         taken = [groups.pop(0)]
-        while groups and _fits(console, _of_columns(grid, stub, [*taken, groups[0]])):
+        while groups and Measurement.get(console, free, _of_columns(grid, stub, [*taken, groups[0]])).maximum <= console.width:
             taken.append(groups.pop(0))
         console.print(_of_columns(grid, stub, taken))
-
-
-def _fits(console: Console, grid: Table) -> bool:
-    return Measurement.get(console, console.options.update(max_width=10_000), grid).maximum <= console.width
 
 
 def _of_columns(grid: Table, stub: int, groups: Sequence[Sequence[Column]]) -> Table:

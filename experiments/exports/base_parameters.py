@@ -8,7 +8,6 @@ import numpy as np
 
 from idbench.experiments.identification.fit import Fit
 from idbench.experiments.results.writing import finite
-from idbench.identify import Parameter
 from idbench.identify.data.kinematics import INERTIAL
 
 ABOUT = (
@@ -22,7 +21,8 @@ ABOUT = (
 def json_text(fit: Fit, model: str) -> str:
     """Return the text: parameters, sigma, covariance, the tree of links, and which columns the regressor has."""
     robot_model, estimate = fit.robot_model, fit.estimates[model]
-    standard = robot_model.grouping.standard
+    base, standard = robot_model.grouping, robot_model.grouping.standard
+    made_of = [base.K[base.parameters.index(p)] for p in fit.basis.parameters]
     parameters = [
         {
             "name": p.name,
@@ -33,9 +33,9 @@ def json_text(fit: Fit, model: str) -> str:
             "joint": p.joint,
             "column": standard.names[standard.places[p]],
             "scale": p.scale,
-            "made_of": _made_of(fit, p),
+            "made_of": {standard.names[k]: float(row[k]) for k in np.flatnonzero(row)},
         }
-        for p, x, s in zip(fit.basis.parameters, estimate.X, estimate.standard_errors, strict=True)
+        for p, x, s, row in zip(fit.basis.parameters, estimate.X, estimate.standard_errors, made_of, strict=True)
     ]
     content = {
         "format": "idbench base parameters 1",
@@ -67,17 +67,9 @@ def json_text(fit: Fit, model: str) -> str:
     return json.dumps(content, indent=1, allow_nan=False) + "\n"
 
 
-def _made_of(fit: Fit, parameter: Parameter) -> dict[str, float]:
-    """Return the standard parameters of a base parameter, and their factors."""
-    base = fit.robot_model.grouping
-    row = base.K[base.parameters.index(parameter)]
-    return {base.standard.names[k]: float(row[k]) for k in np.flatnonzero(row)}
-
-
 def interval_of(fit: Fit, model: str) -> dict[str, list[float]]:
     """Return the half widths of the torques' intervals, the fitted speeds and torques, and the band [Hz]; NaN if not known."""
     interval, nothing = fit.torque_intervals[model], [nan] * fit.basis.n
     if interval is None:
         return dict.fromkeys(("half", "speed", "torque"), nothing) | {"band": [nan]}
-    each = {name: getattr(interval, name).tolist() for name in ("half", "speed", "torque")}
-    return each | {"band": [interval.band]}
+    return {name: getattr(interval, name).tolist() for name in ("half", "speed", "torque")} | {"band": [interval.band]}

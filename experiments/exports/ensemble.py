@@ -136,8 +136,7 @@ class Ensemble:
             step, centred = float(np.median(np.diff(time))), residual - residual.mean(axis=-1, keepdims=True)
             sizes.append(np.mean(residual**2, axis=-1))
             n = residual.shape[-1]
-            power = np.abs(np.fft.rfft(centred, 2 * n)) ** 2
-            correlation = np.fft.irfft(power)[:, :n]
+            correlation = np.fft.irfft(np.abs(np.fft.rfft(centred, 2 * n)) ** 2)[:, :n]
             below = correlation < correlation[:, :1] * np.exp(-1.0)
             times.append(step * np.where(below.any(axis=-1), below.argmax(axis=-1), n))
         return self.spread * np.sqrt(np.mean(sizes, axis=0)), np.mean(times, axis=0)
@@ -160,8 +159,7 @@ class Ensemble:
             found[gone.all(axis=1)] = np.inf  # a run in which all diverge holds nothing
             low, high = np.nanquantile(found, tails, axis=1)
             ends = np.nanquantile(usual[:, :, -1], tails, axis=1)
-            usual_width = np.asarray((ends[1] - ends[0]).mean(axis=0))
-            bands.append(FreeRuns(held.title, q, low, high, usual_width, float(gone.mean())))
+            bands.append(FreeRuns(held.title, q, low, high, np.asarray((ends[1] - ends[0]).mean(axis=0)), float(gone.mean())))
         return bands
 
     def _drawn(self, draws: int, spread: float, rng: np.random.Generator) -> dict[str, Array]:
@@ -171,8 +169,7 @@ class Ensemble:
         values, vectors = np.linalg.eigh(estimate.covariance / np.outer(sigma, sigma))
         root = sigma[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
         deviations = spread * np.matmul(root, rng.standard_normal((draws, len(root)))[..., None])[..., 0]
-        found = drawn_about(robot_model, estimate, deviations)
-        each = dict(zip(robot_model.grouping.standard.names, found.T, strict=True))
+        each = dict(zip(robot_model.grouping.standard.names, drawn_about(robot_model, estimate, deviations).T, strict=True))
         equal: Mapping[str, Any] = robot_model.equal(each)
         return {name: np.broadcast_to(np.asarray(x, dtype=np.float64), (draws,)) for name, x in equal.items()}
 
@@ -211,8 +208,7 @@ class Ensemble:
         """
         robot, log, qd = held.driven(self.model)
         samples = round(LENGTH * log.fs)
-        count = log.samples // samples
-        if count < 1:
+        if (count := log.samples // samples) < 1:
             raise IdentificationError(f"a log of {log.samples / log.fs:.3g} s has no run of {LENGTH:g} s")
         first = samples * np.unique(np.linspace(0, count - 1, min(count, STRETCHES)).astype(np.intp))
         draws, fields = len(next(iter(standard.values()))), fields_of(robot, standard)

@@ -200,9 +200,8 @@ def training_ranges(fit: Fit, model: str, path: Path) -> Exported:
 def _content(fit: Fit, model: str, path: Path) -> Content:
     estimate = fit.estimates[model]
     functions = require_formulas(estimate.problem.basis, fit.robot_model.tree, path)
-    return Content(
-        functions, estimate.X.tolist(), estimate.standard_errors.tolist(), interval_of(fit, model), origin(fit, model)
-    )
+    values, sigma = estimate.X.tolist(), estimate.standard_errors.tolist()
+    return Content(functions, values, sigma, interval_of(fit, model), origin(fit, model))
 
 
 def require_functions(robot_model: RobotModel, path: Path) -> None:

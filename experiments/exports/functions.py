@@ -153,8 +153,7 @@ class RobotFunctions:
         """Return the mass matrix, row by row."""
         M: list[Torques] = [[0.0] * self.n for _ in range(self.n)]
         for j in range(self.n):
-            unit = SymbolArray(np.eye(self.n)[:, [j]])
-            column = self._rigid(self._still(unit), gravity=False)
+            column = self._rigid(self._still(SymbolArray(np.eye(self.n)[:, [j]])), gravity=False)
             for i in range(j, self.n):
                 M[i][j] = M[j][i] = column[i]
         return [x for row in M for x in row]
@@ -232,8 +231,7 @@ class _AboutParameters(AbstractWithoutMomentum):
         return self.of.slopes(self.block, state)
 
     def dissipation(self, state: State) -> Any:
-        columns = self.of.slopes(self.block, state).items()
-        return {(0, p): state.qd[..., row, :] * column for (row, p), column in columns}
+        return {(0, p): state.qd[..., row, :] * column for (row, p), column in self.of.slopes(self.block, state).items()}
 
 
 def _sums(a: Torques, b: Torques) -> Torques:

@@ -131,12 +131,8 @@ def python_text(content: Content) -> str:
         sigma=_listed([_number(x) for x in content.sigma]),
         **{part: _listed([_number(x) for x in values]) for part, values in content.interval.items()},
     )
-    return (
-        head
-        + "\n\n".join(_defined(content, language, function) for function in of.functions)
-        + "\n"
-        + TAIL.replace("{n}", str(of.n))
-    )
+    functions = "\n\n".join(_defined(content, language, function) for function in of.functions)
+    return f"{head}{functions}\n{TAIL.replace('{n}', str(of.n))}"
 
 
 def _quoted(text: str) -> str:

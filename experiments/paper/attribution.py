@@ -59,7 +59,6 @@ def imperfections(table2: Scenario) -> list[Imperfection]:
     delay, coarse = Timing(delay=table2.timing.delay), Physics(integrator="implicitfast")
     chopper = table2.drive if isinstance(table2.drive, SwitchedDrive) else SwitchedDrive()
     plain = replace(chopper, emf_compensation=0.0)
-    ripple = replace(ideal, drive=AveragedDrive(), ripple=table2.ripple)
     return [
         Imperfection("nothing", ideal, chain),
         Imperfection("hold, not given", ideal, logged),
@@ -68,7 +67,7 @@ def imperfections(table2: Scenario) -> list[Imperfection]:
         Imperfection("half a physics step of 1 ms, given", replace(ideal, physics=coarse), chain),
         Imperfection("quantization", replace(ideal, encoder=table2.encoder), chain),
         Imperfection("quantization, 20 bits", replace(ideal, encoder=IncrementalEncoder(lines=(2**18,))), chain),
-        Imperfection("cogging and commutation", ripple, chain),
+        Imperfection("cogging and commutation", replace(ideal, drive=AveragedDrive(), ripple=table2.ripple), chain),
         Imperfection("chopper", replace(ideal, drive=chopper), chain),
         Imperfection("chopper without EMF compensation", replace(ideal, drive=plain), chain),
         Imperfection("standstill, not masked", ideal, unmasked),

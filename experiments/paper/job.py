@@ -17,7 +17,7 @@ from idbench.sim.robot.robot import Robot
 from idbench.sim.scenario.scenario import Scenario
 from idbench.sim.scenario.scenario_file import load
 from idbench.sim.trajectories import Quintic
-from idbench.sim.trajectories.quintic import draw_waypoint
+from idbench.sim.trajectories.quintic import draw_waypoint, draw_waypoints
 
 PAPER_CONDITION = {MODELS.create(name): PAPER[name].condition_number for name in ("explicit", "power")}
 """Cond(W) of the paper's Table 1; that of the implicit model is the explicit one's."""
@@ -64,12 +64,15 @@ class TrajectorySearch:
     def run(self, robot: Robot, progress: Searching | None = None) -> Scenario:
         """Return the scenario found; ExperimentError if the rounds end before the tolerance is reached."""
         rng = np.random.default_rng(self.seed)
-        durations = self._durations(rng)
-        best, distance = self._scenario(robot, self._drawn(rng, robot), durations), inf
+        shares = rng.uniform(0.85, 1.15, MOVES)
+        # Whole samples, as the paper's plan of 100 Hz has them; together the motion's time.
+        durations = np.diff(np.rint(np.cumsum(shares) / shares.sum() * MOTION * FS), prepend=0.0) / FS
+        points = draw_waypoints(rng, MOVES + 1, robot.ranges, self.clearance, self.smallest_move)
+        best, distance = self._scenario(robot, points, durations), inf
         excess = self.excess(robot, best)
         for number in range(self.rounds):
-            points = [self._redrawn(rng, robot, np.array(best.quintic().waypoints)) for _ in range(CANDIDATES)]
-            others = [self._scenario(robot, p, durations) for p in points]
+            redrawn = [self._redrawn(rng, robot, np.array(best.quintic().waypoints)) for _ in range(CANDIDATES)]
+            others = [self._scenario(robot, points, durations) for points in redrawn]
             if excess > 0:
                 best, excess = min([(best, excess), *((o, self.excess(robot, o)) for o in others)], key=lambda pair: pair[1])
             else:
@@ -115,25 +118,11 @@ class TrajectorySearch:
         used = np.concatenate([scenario.quintic().points.peak_velocity / self.velocity, torque / robot.torque_limits])
         return float(used.max() - 1)
 
-    def _durations(self, rng: np.random.Generator) -> Array:
-        """Return the times of the moves: whole samples, as the paper's plan of 100 Hz has them; together the motion's."""
-        shares = rng.uniform(0.85, 1.15, MOVES)
-        ends = np.rint(np.cumsum(shares) / shares.sum() * MOTION * FS)
-        return np.diff(ends, prepend=0.0) / FS
-
-    def _drawn(self, rng: np.random.Generator, robot: Robot) -> Array:
-        points = np.zeros((MOVES + 1, robot.n))
-        for k in range(MOVES + 1):
-            points[k] = self._waypoint(rng, robot, points[max(k - 1, 0) : k])
-        return points
-
     def _redrawn(self, rng: np.random.Generator, robot: Robot, points: Array) -> Array:
         k = int(rng.integers(len(points)))
-        points[k] = self._waypoint(rng, robot, np.delete(points, k, axis=0)[max(k - 1, 0) : k + 1])
+        neighbours = np.delete(points, k, axis=0)[max(k - 1, 0) : k + 1]
+        points[k] = draw_waypoint(rng, robot.ranges, neighbours, self.clearance, self.smallest_move)
         return points
-
-    def _waypoint(self, rng: np.random.Generator, robot: Robot, neighbours: Array) -> Array:
-        return draw_waypoint(rng, robot.ranges, neighbours, self.clearance, self.smallest_move)
 
     def _scenario(self, robot: Robot, points: Array, durations: Array) -> Scenario:
         waypoints = tuple(tuple(float(x) for x in point) for point in points)
@@ -146,8 +135,7 @@ def table1_of(asked: Table1Request, searching: Searching | None = None) -> Table
     if asked.seed is not None and asked.scenario is not None:
         raise ExperimentError(f"--seed {asked.seed} and --scenario {asked.scenario} name two trajectories: give one")
     chains = CHAINS_COMPARED if asked.chain == "all" else (asked.chain,)
-    scenario = load(asked.scenario or SCENARIO) if asked.seed is None else searched(asked.seed, searching)
-    return Table1(scenario, chains)
+    return Table1(load(asked.scenario or SCENARIO) if asked.seed is None else searched(asked.seed, searching), chains)
 
 
 def searched(seed: int, searching: Searching | None = None) -> Scenario:

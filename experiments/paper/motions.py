@@ -62,8 +62,7 @@ class Errors:
         """True where the paper's error of each parameter lies inside the band, shape (p,)."""
         low, high = (self.percentiles(model, q) for q in BAND)
         paper = np.array(PAPER[model].error)
-        inside: npt.NDArray[np.bool_] = (low <= paper + ROUNDED) & (high >= paper - ROUNDED)
-        return inside
+        return (low <= paper + ROUNDED) & (high >= paper - ROUNDED)
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,8 +118,7 @@ class Table1Motions:
     def _kept(self, found: Sequence[tuple[Array, Array]]) -> Errors:
         """Return the errors of motions whose condition numbers are the paper's."""
         paper = np.array([column.condition_number for column in PAPER.values()])
-        near = [(c, e) for c, e in found if (np.abs(np.log(c / paper)) <= np.log1p(self.tolerance)).all()]
-        if not near:
+        if not (near := [(c, e) for c, e in found if (np.abs(np.log(c / paper)) <= np.log1p(self.tolerance)).all()]):
             raise ExperimentError(
                 f"none of {len(found)} motions has the paper's condition numbers within {self.tolerance:.0%}: "
                 "draw more (--motions)"

@@ -33,6 +33,7 @@ from idbench.identify import (
     MotionLog,
     NoPrefilter,
     OrdinaryLeastSquares,
+    TorqueChannel,
     identify_each,
     paper_chain,
     scara,
@@ -86,6 +87,14 @@ PAPER: Mapping[str, Table1Column] = {
 """Table 1 and section 7.2 of the paper."""
 
 
+def settled(name: str, rest: float, fs: float, torque: TorqueChannel) -> Chain:
+    """Return the chain `name`, its filters settling while the robot rests so long; raise ExperimentError if they do not."""
+    chain = CHAINS.create(name)
+    if (halo := chain.halo(fs, torque)) > rest:
+        raise ExperimentError(f"rest = {rest:g} s is shorter than the {halo:.3g} s that chain {name} looks: raise it")
+    return replace(chain, trim=rest)
+
+
 @dataclass(frozen=True, eq=False)
 class Table1:
     """The comparison, computed when it is asked for."""
@@ -124,8 +133,10 @@ class Table1:
 
     @cached_property
     def estimates(self) -> dict[str, dict[str, Estimate]]:
-        """The estimate of every form, by chain."""
-        return {name: self._identified(self._settled(name)) for name in self.chains}
+        """The estimate of every form, by chain; two are integrated: energy (Eq. 11, 20), and integral (after Eq. 9)."""
+        log, rest, models = self.log, self.scenario.quintic().rest, {name: MODELS.create(name) for name in MODELS}
+        chains = {name: settled(name, rest, log.fs, log.torque) for name in self.chains}
+        return {name: identify_each(log, scara(), models, chain, OrdinaryLeastSquares()) for name, chain in chains.items()}
 
     @property
     def rates(self) -> dict[str, Rates]:
@@ -152,18 +163,6 @@ class Table1:
             "models": by_chain[main],
             **{f"{name}_chain": by_chain[name] for name in others},
         }
-
-    def _settled(self, name: str) -> Chain:
-        """Return the chain `name`, its filters settling while the robot rests."""
-        chain, rest = CHAINS.create(name), self.scenario.quintic().rest
-        if (halo := chain.halo(self.log.fs, self.log.torque)) > rest:
-            raise ExperimentError(f"rest = {rest:g} s is shorter than the {halo:.3g} s that chain {name} looks: raise it")
-        return replace(chain, trim=rest)
-
-    def _identified(self, chain: Chain) -> dict[str, Estimate]:
-        """Return the estimates of the three models, and of two integrated ones: energy (Eq. 11, 20), integral (after Eq. 9)."""
-        models = {name: MODELS.create(name) for name in MODELS}
-        return identify_each(self.log, scara(), models, chain, OrdinaryLeastSquares())
 
 
 OVER = {"energy": "power", "integral": "implicit"}  # Models that are others, integrated

@@ -14,7 +14,6 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.fit import Fit
 from idbench.experiments.identification.fitting import fit
 from idbench.experiments.identification.logs import Logs
@@ -22,9 +21,9 @@ from idbench.experiments.identification.method import Method
 from idbench.experiments.identification.request import Request
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.paper.attribution import Attribution, Errors
-from idbench.experiments.paper.table1 import conclusion_line
+from idbench.experiments.paper.table1 import conclusion_line, settled
 from idbench.experiments.text import new_table, percent, print_table, printed
-from idbench.identify import CHAINS, Estimate, TorqueChannel
+from idbench.identify import Estimate, TorqueChannel
 from idbench.sim.engine.run import Run
 from idbench.sim.engine.simulation import Progress, simulate
 from idbench.sim.engine.watch import Watch
@@ -93,11 +92,7 @@ class Table2:
         scara_truth(self.scenario.real_robot)
         held = TorqueChannel("held", self.scenario.timing.delay)
         for name, _ in PROCESSINGS.values():
-            halo = CHAINS.create(name).halo(self.scenario.fs, held)
-            if halo > self.rest:
-                raise ExperimentError(
-                    f"rest = {self.rest:g} s is shorter than the {halo:.3g} s that chain {name} looks: raise it"
-                )
+            settled(name, self.rest, self.scenario.fs, held)
 
     @cached_property
     def run(self) -> Run:
@@ -120,8 +115,7 @@ class Table2:
     def _identified(self, processing: str, model: str) -> Fit:
         logs = tuple(self.run.alone(i) for i in range(REALIZATIONS[model]))
         chain, estimator = PROCESSINGS[processing]
-        method = Method.named(chain, estimator).trimmed(self.rest)
-        request = Request(RobotModel(self.scenario.robot), (model,), method)
+        request = Request(RobotModel(self.scenario.robot), (model,), Method.named(chain, estimator).trimmed(self.rest))
         return fit(request, Logs(logs, truth=self.truth))
 
     @property

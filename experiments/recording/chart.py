@@ -81,8 +81,7 @@ class Chart:
     def line(self, name: str, x: Array, y: Array, color: Color, width: float = 1.2, *, listed: bool = True) -> None:
         """Draw a line through values, with a gap where one is not finite, and list it in the legend."""
         where = self._where(x, y)
-        gaps = np.flatnonzero(~np.isfinite(where).all(axis=1))
-        runs = [run[np.isfinite(run).all(axis=1)] for run in np.split(where, gaps)]
+        runs = [run[np.isfinite(run).all(axis=1)] for run in np.split(where, np.flatnonzero(~np.isfinite(where).all(axis=1)))]
         self._strips(f"lines/{part(name)}", [run for run in runs if len(run) > 1], color, width, LINE_ORDER)
         if listed:
             self.list_entry(name, color)
@@ -95,9 +94,8 @@ class Chart:
     def marks(self, name: str, x: Array, y: Array, color: Color, symbol: Symbol = "circle") -> None:
         """Draw values as symbols."""
         where, shape = self._where(x, y), SIZE * np.array(_TURNS[symbol])
-        self._strips(
-            f"marks/{part(name)}", [at + shape for at in where[np.isfinite(where).all(axis=1)]], color, 1.0, MARK_ORDER
-        )
+        strips = [at + shape for at in where[np.isfinite(where).all(axis=1)]]
+        self._strips(f"marks/{part(name)}", strips, color, 1.0, MARK_ORDER)
 
     def write(self, name: str, x: Array, y: Array, texts: Sequence[str], color: Color = TEXT) -> None:
         """Write at values."""

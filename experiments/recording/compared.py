@@ -76,8 +76,8 @@ def named_runs(folders: Sequence[Path]) -> list[Compared]:
     names = [f"{k}-{name}" for k, name in enumerate(short, 1)] if alike else short
     runs = [Compared(folder, name) for folder, name in zip(folders, names, strict=True)]
     _ = [run.summary for run in runs]
-    first = runs[0]
-    for run in runs[1:]:
+    first, *others = runs
+    for run in others:
         if run.log.n != first.log.n:
             raise ExperimentError(f"{run.folder} has {run.log.n} joints, {first.folder} {first.log.n}: they cannot be compared")
     return runs
@@ -101,8 +101,7 @@ def differences(runs: Sequence[Compared]) -> str:
     """Settings that differ, as a markdown table."""
     every = [run.settings for run in runs]
     keys = dict.fromkeys(key for settings in every for key in settings)
-    differing = [key for key in keys if len({json.dumps(s.get(key), sort_keys=True) for s in every}) > 1]
-    if not differing:
+    if not (differing := [key for key in keys if len({json.dumps(s.get(key), sort_keys=True) for s in every}) > 1]):
         return "**Nothing differs** in what was simulated and how it was identified."
     rows = [f"| {key} | {' | '.join(_shown(s.get(key)) for s in every)} |" for key in differing]
     head = [f"| setting | {' | '.join(run.name for run in runs)} |", "|---|" + "---|" * len(runs)]
@@ -137,13 +136,12 @@ def estimates(runs: Sequence[Compared]) -> str:
 def difference(first: MotionLog, other: MotionLog, shift: float) -> tuple[Array, dict[str, Array]]:
     """Return times of the first log at which both are there [s], and q and torque of the other less those of the first."""
     t = first.t[(first.t >= other.t[0] + shift) & (first.t <= other.t[-1] + shift)]
-    found = {}
-    for name in ("q", "tau"):
-        a, b = getattr(first, name), getattr(other, name)
-        found[name] = np.stack([
-            np.interp(t - shift, other.t, b[:, j]) - np.interp(t, first.t, a[:, j]) for j in range(first.n)
-        ], axis=1)  # fmt: skip
-    return t, found
+
+    def apart(a: Array, b: Array) -> Array:
+        pairs = zip(a.T, b.T, strict=True)
+        return np.stack([np.interp(t - shift, other.t, y) - np.interp(t, first.t, x) for x, y in pairs], axis=1)
+
+    return t, {"q": apart(first.q, other.q), "tau": apart(first.tau, other.tau)}
 
 
 def _of(run: Compared, model: str) -> dict[str, tuple[float, float]]:

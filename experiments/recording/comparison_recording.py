@@ -36,15 +36,11 @@ from idbench.sim.scenario.scenario_file import to_toml
 
 def record_table1(table: Table1, audience: Audience | None = None) -> list[tuple[str, Stream]]:
     """Return the streams of the recording of `table`, by the name of their file."""
-    log = table.log
-    reference = table.reference
-    scenario = table.scenario
-    base = Base(
-        recording_id(scenario.name, to_toml(scenario).encode()), table.robot, log.fs, ("measured",), reference.qd, audience
-    )
+    log, reference, scenario = table.log, table.reference, table.scenario
+    name = recording_id(scenario.name, to_toml(scenario).encode())
+    base = Base(name, table.robot, log.fs, ("measured",), reference.qd, audience)
     base.stream.describe(scenario=to_toml(scenario), seed=str(scenario.seed), fs_hz=f"{log.fs:g}")
-    planned = {"q/planned": reference.q, "qd/planned": reference.qd, "qdd/planned": reference.qdd}
-    base.replay(log, planned, reference.qd)
+    base.replay(log, {"q/planned": reference.q, "qd/planned": reference.qd, "qdd/planned": reference.qdd}, reference.qd)
     base.arm.trace(log.q)
     base.finish(table1_markdown(table))
     streams = [(BASE, base.stream)]
@@ -142,16 +138,14 @@ def compare(folders: Sequence[Path], tab: str, out: Path) -> None:
 
 def _copy(stream: Stream, run: Compared, number: int, shift: float) -> None:
     """Send what a run's recording holds: all of the first one's; of others signals and identifications, by the run's name."""
-    paths = files(run.folder)
-    if not paths:
+    if not (paths := files(run.folder)):
         raise ResultsError(f"there is no recording in {run.folder}: run it without --no-rerun")
     labels = [path for path in paths if path.name not in (BASE, INNER)]
     copied = set[str]()
     for reader in map(RrdReader, reversed(paths)):
         chunks = [chunk for entry in reader.recordings() for chunk in reader.stream(store=entry).to_chunks()]
         for chunk in chunks:
-            place = _place(chunk.entity_path.strip("/"), run.name, number, len(labels) > 1)
-            if place is not None:
+            if (place := _place(chunk.entity_path.strip("/"), run.name, number, len(labels) > 1)) is not None:
                 stream.add(_moved(chunk, shift).with_entity_path(f"/{place}"), place)
                 copied.add(place)
     _restyle(stream, run, number, copied)
@@ -185,13 +179,10 @@ def _restyle(stream: Stream, run: Compared, number: int, copied: AbstractSet[str
     """Give the curves of a run colours and names of its own; the second one's lie thin over the first one's."""
     for path in sorted(copied):
         match path.split("/"):
-            case ["versus", _, *signal]:
-                colors = [lighter(color, 2) for color in joint_colors(run.log.n)]
-                names = [f"{signal[-1]} {j + 1}, {run.name}" for j in range(run.log.n)]
-                stream.style(path, names, colors, 1.2)
-            case [*signal] if path in SIGNALS:
-                names = [f"{signal[-1]} {j + 1}, {run.name}" for j in range(run.log.n)]
-                stream.style(path, names, joint_colors(run.log.n), 4.0)
+            case [head, *_, kind] if head == "versus" or path in SIGNALS:
+                fade, width = (2, 1.2) if head == "versus" else (0, 4.0)
+                names = [f"{kind} {j + 1}, {run.name}" for j in range(run.log.n)]
+                stream.style(path, names, [lighter(color, fade) for color in joint_colors(run.log.n)], width)
             case ["identify", _, *_, "lines" | "marks" | "segments" | "legend", name] if _model(name, run):
                 stream.keep(path, rr.LineStrips2D.from_fields(colors=[model_color(_model(name, run), number)]))
             case ["identify", _, model, "predicted" | "residual", _]:
@@ -214,6 +205,5 @@ def _send_differences(stream: Stream, first: Compared, run: Compared, shift: flo
     t, found = difference(first.log, run.log, shift)
     for name, values in found.items():
         path = f"difference/{name}/{part(run.name)}"
-        names = [f"{name}{j + 1}, {run.name} - {first.name}" for j in range(run.log.n)]
-        stream.style(path, names, joint_colors(run.log.n))
+        stream.style(path, [f"{name}{j + 1}, {run.name} - {first.name}" for j in range(run.log.n)], joint_colors(run.log.n))
         stream.curves(path, [seconds(np.asarray(t))], values)

@@ -71,9 +71,7 @@ def _send_sigmas(stream: Stream, found: Excited) -> None:
 
 def _send_told(stream: Stream, found: Excited) -> None:
     """Send the share of each stretch of the motion in the information about each parameter."""
-    names = found.design.robot_model.basis.names
-    shares = found.shares
-    duration = found.design.duration
+    names, shares, duration = found.design.robot_model.basis.names, found.shares, found.design.duration
     begin = len(found.ways[0].q) / FS + REST
     middles = begin + (np.arange(STRETCHES) + 0.5) * duration / STRETCHES
     for at, members in in_charts(names, MAX_ROWS):

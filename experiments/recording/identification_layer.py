@@ -15,15 +15,7 @@ from idbench.experiments.recording.layouts import tabs
 from idbench.experiments.recording.residual_charts import ResidualCharts, send_iterations, send_parameters
 from idbench.experiments.recording.stream import Stream
 from idbench.experiments.text import FORM_WIDTHS, GREY, JOINTS, UNITS, Color, joint_colors, kind_colors, model_color
-from idbench.identify import (
-    Array,
-    Estimate,
-    JointFit,
-    filtered,
-    measured_state,
-    recursive_least_squares,
-    smoothed_motion,
-)
+from idbench.identify import Array, Estimate, JointFit, filtered, measured_state, recursive_least_squares, smoothed_motion
 
 EVERY = 0.5  # Time between the instants of recursive estimates [s]
 WIDE = 7.0  # Width of what a mistake explains, on which the residual is drawn
@@ -125,10 +117,10 @@ class Layer:
                 if not len(used):  # a joint that never moves
                     continue
                 path, colors = f"{at}/columns/{row}", [JOINTS[p % len(JOINTS)] for p in used]
-                self.stream.style(path, [estimate.names[p] for p in used], colors)
+                of = [estimate.names[p] for p in used]
+                self.stream.style(path, of, colors)
                 self.stream.curves(path, [seconds(found.time[rows])], W[rows][:, used])
-                keys = {estimate.names[p]: color for p, color in zip(used, colors, strict=True)}
-                send_keys(self.stream, f"{path}/keys", keys)
+                send_keys(self.stream, f"{path}/keys", dict(zip(of, colors, strict=True)))
 
     def _running(self, at: str, form: str, estimate: Estimate, color: Color) -> None:
         """Send the estimate as it comes about, with its variance, once that is small enough to be worth a look."""
@@ -143,8 +135,7 @@ class Layer:
             known = np.isfinite(running.X[:, p]) & (settled | (t > t[-1] / 2))
             path, variance = f"{at}/estimate/{part(name)}", running.sigma[known, p] ** 2
             self.stream.keep(path, rr.Measurements.from_fields(names=[form], colors=[color], widths=[2.0]))
-            columns = rr.Measurements.columns(values=running.X[known, p], variances=variance)
-            self.stream.send(path, [seconds(t[known])], columns)
+            self.stream.send(path, [seconds(t[known])], rr.Measurements.columns(values=running.X[known, p], variances=variance))
 
     def _mistake(self) -> None:
         """Send what the first mistake that residuals show explains of them."""

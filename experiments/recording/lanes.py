@@ -84,14 +84,11 @@ class Lanes:
         """Send the states of a lane at the instants `t` [s]."""
         if path not in self._last:
             nothing = [" "] * len(STATES)  # words would be cut off where a state is short: the view's title tells the colours
-            style = rr.StateConfiguration(values=list(STATES), labels=nothing, colors=list(STATES.values()))
-            self.stream.keep(path, style)
+            self.stream.keep(path, rr.StateConfiguration(values=list(STATES), labels=nothing, colors=list(STATES.values())))
         now = np.concatenate([[self._last.get(path, "")], states])
         self._last[path] = str(now[-1])
-        changed = np.flatnonzero(now[1:] != now[:-1])
-        if len(changed):
-            columns = rr.StateChange.columns(state=now[1 + changed].tolist())
-            self.stream.send(path, time_columns(t[changed], self.fs), columns)
+        if len(changed := np.flatnonzero(now[1:] != now[:-1])):
+            self.stream.send(path, time_columns(t[changed], self.fs), rr.StateChange.columns(state=now[1 + changed].tolist()))
 
 
 def joint_states(qd: Array, slow: float, limited: Array | None, before: float) -> npt.NDArray[np.str_]:

@@ -61,8 +61,7 @@ def compare(shelf: Shelf) -> Part:
 def excited(shelf: Shelf) -> Part:
     """Return a designed motion: the arm, limits in use, predicted standard errors, and when they come about."""
     sigmas = charts(shelf, "predicted sigma", "excited/sigma/*", SQUARE)
-    told = charts(shelf, "which stretch excites which parameter: bright is most", "excited/told/*")
-    if not told:
+    if not (told := charts(shelf, "which stretch excites which parameter: bright is most", "excited/told/*")):
         return None
     limits = [
         plot(shelf, f"{path.partition('_')[2].replace('_', ' ')} [% of its limit]", f"limits/{path}")
@@ -79,8 +78,7 @@ def excited(shelf: Shelf) -> Part:
 
 def servos(shelf: Shelf) -> Part:
     """Return servos: commands, measured and simulated positions, and residuals."""
-    joints = shelf.parts("servo/*/residual", -2)
-    if not joints:
+    if not (joints := shelf.parts("servo/*/residual", -2)):
         return None
     each = [
         column(

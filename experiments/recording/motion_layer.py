@@ -57,9 +57,8 @@ class Arm:
     def trace(self, q: Array) -> None:
         """Draw the way of every site along `q` [rad], shape (time, joint)."""
         for site, position in Mover(self._robot).at(q).sites.items():
-            self._stream.keep(
-                f"world/path_of_{part(site)}", rr.LineStrips3D([position], radii=[0.0015], colors=[[190, 190, 190]])
-            )
+            line = rr.LineStrips3D([position], radii=[0.0015], colors=[[190, 190, 190]])
+            self._stream.keep(f"world/path_of_{part(site)}", line)
 
 
 def _drawn(shape: SceneShape, wire: Color | None) -> rr.AsComponents:
@@ -74,19 +73,14 @@ def _drawn(shape: SceneShape, wire: Color | None) -> rr.AsComponents:
         case "capsule":  # rerun's starts at the origin, MuJoCo's is centred there
             centre = [[0.0, 0.0, -size[1]]]
             return rr.Capsules3D(lengths=[2 * size[1]], radii=[size[0]], translations=centre, colors=color, fill_mode=fill)
-        case "sphere":
-            return rr.Ellipsoids3D(half_sizes=[[size[0]] * 3], colors=color, fill_mode=fill)
-        case "ellipsoid":
-            return rr.Ellipsoids3D(half_sizes=[size], colors=color, fill_mode=fill)
+        case "sphere" | "ellipsoid":
+            half = [size[0]] * 3 if shape.kind == "sphere" else size
+            return rr.Ellipsoids3D(half_sizes=[half], colors=color, fill_mode=fill)
+        case "mesh" if wire is None:
+            return rr.Mesh3D(vertex_positions=shape.vertices, triangle_indices=shape.faces, albedo_factor=shape.rgba)
         case "mesh":
-            return _mesh(shape, wire)
-
-
-def _mesh(shape: SceneShape, wire: Color | None) -> rr.AsComponents:
-    if wire is None:
-        return rr.Mesh3D(vertex_positions=shape.vertices, triangle_indices=shape.faces, albedo_factor=shape.rgba)
-    low, high = shape.vertices.min(axis=0), shape.vertices.max(axis=0)  # every edge of a mesh would hide the arm
-    return rr.Boxes3D(half_sizes=[(high - low) / 2], centers=[(high + low) / 2], colors=[wire], fill_mode="majorwireframe")
+            low, high = shape.vertices.min(axis=0), shape.vertices.max(axis=0)  # every edge of a mesh would hide the arm
+            return rr.Boxes3D(half_sizes=[(high - low) / 2], centers=[(high + low) / 2], colors=color, fill_mode=fill)
 
 
 LOGGED = {"q/measured", "torque/log"}  # What a robot would log: numbered by samples, too, which takes room
@@ -182,8 +176,7 @@ class Base:
     def _curves(self, stream: Stream, path: str, times: Times, values: Array) -> None:
         if path not in stream.paths:
             kind, colors = path.rsplit("/", 1)[-1], len(self._joints)
-            names = [f"{kind} {joint}" for joint in self._joints]
-            stream.style(path, names, kind_colors(kind, colors), WIDTHS.get(kind, 1.5))
+            stream.style(path, [f"{kind} {joint}" for joint in self._joints], kind_colors(kind, colors), WIDTHS.get(kind, 1.5))
         stream.curves(path, times, values)
 
     def _accelerate(self, t: Array, qd: Array) -> None:

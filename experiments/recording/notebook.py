@@ -32,8 +32,7 @@ def notebook_viewer(results: Path, tab: str = "", width: int = 1200, height: int
     ResultsError
         If there is no recording, it has no such tab, or rerun's notebook viewer is not installed.
     """
-    paths = files(results)
-    if not paths:
+    if not (paths := files(results)):
         raise ResultsError(f"there is no recording in {results}: name a results folder, such as runs/table1")
     name, entities = known(paths)
     layout, recording = tabs(entities, tab), rr.RecordingStream(APPLICATION, recording_id=name)

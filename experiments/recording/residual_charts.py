@@ -56,10 +56,13 @@ def send_parameters(stream: Stream, at: str, fit: Fit, number: int = 0) -> None:
     off = {form: (estimate.X - reference) / size for form, estimate in fit.estimates.items()}
     reach = {form: SIGMAS * estimate.standard_errors / size for form, estimate in fit.estimates.items()}
     unsure = next(iter(reach.values())) > SIGMAS * 100 * WEAK
+    what = "error" if fit.truth else f"difference from {fit.leading}"
     for k, (title, members) in enumerate(_parts(fit)):
         names = [f"{fit.basis.names[p]}{' = 0' if reference[p] == 0 else '?' * bool(unsure[p])}" for p in members]
         far = [np.where(unsure, np.nan, np.abs(off[form]) + reach[form])[members] for form in off]
-        chart = Chart(stream, f"{at}/parameters/{k:02}/{part(title)}", _scale(fit, far), listed("", names), SQUARE)
+        high = percent_reach(np.concatenate(far))  # what is beyond the ends of the axis lies there
+        x_axis = Linear(f"{what} [% of the value]; bars: 95 %", -high, high)
+        chart = Chart(stream, f"{at}/parameters/{k:02}/{part(title)}", x_axis, listed("", names), SQUARE)
         ends = np.array([-0.5, len(members) - 0.5])
         chart.line(TRUE if fit.truth else next(iter(fit.estimates)), np.zeros(2), ends, GREY, listed=False)
         for i, form in enumerate(fit.estimates):
@@ -82,18 +85,10 @@ def _parts(fit: Fit) -> Iterator[tuple[str, npt.NDArray[np.intp]]]:
         yield fit.robot_model.robot.joints[j], every[joints == j]
 
 
-def _scale(fit: Fit, farthest: Sequence[Array]) -> Linear:
-    """Return an axis, in % of the values, for parameters that are known; what is beyond its ends lies there."""
-    high, what = percent_reach(np.concatenate(farthest)), "error" if fit.truth else f"difference from {fit.leading}"
-    return Linear(f"{what} [% of the value]; bars: 95 %", -high, high)
-
-
 def _singular_values(stream: Stream, at: str, fit: Fit, number: int) -> None:
     """Send the singular values of W, over the largest; beyond the allowed conditions, parameters cannot be distinguished."""
-    values = {
-        form: np.linalg.svd(estimate.problem.factors.together.R_W, compute_uv=False) for form, estimate in fit.estimates.items()
-    }
-    shares = {form: s / s[0] for form, s in values.items()}
+    factors = {form: estimate.problem.factors.together.R_W for form, estimate in fit.estimates.items()}
+    shares = {form: (s := np.linalg.svd(R, compute_uv=False)) / s[0] for form, R in factors.items()}
     numbers = np.arange(1.0, 1 + len(fit.basis.names))
     x, y = linear("number", numbers), decades("over the largest", *shares.values())
     chart = Chart(stream, f"{at}/singular_values", x, y, NARROW)

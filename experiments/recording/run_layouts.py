@@ -85,8 +85,8 @@ def _frictions(shelf: Shelf, joint: str, method: str) -> list[Part]:
         "over_velocity": "residual over velocity",
         "over_position": "residual over position",
     }
-    found = [charts(shelf, f"{joint}: {what}{of}", f"identify/{method}/{kind}/{joint}", NARROW) for kind, what in kinds.items()]
-    return [view for views in found for view in views]
+    at, each = f"identify/{method}", kinds.items()
+    return [view for kind, what in each for view in charts(shelf, f"{joint}: {what}{of}", f"{at}/{kind}/{joint}", NARROW)]
 
 
 def drive(shelf: Shelf) -> Part:
@@ -145,14 +145,13 @@ def noise(shelf: Shelf) -> Part:
 
 def excitation(shelf: Shelf) -> Part:
     """Return the columns of W, and its singular values."""
-    rows = shelf.parts("identify/*/*/columns/*")
-    found = [shelf.of(f"identify/*/*/columns/{row}")[0] for row in rows]
+    found = {row: shelf.of(f"identify/*/*/columns/{row}")[0] for row in shelf.parts("identify/*/*/columns/*")}
     W = [
         column(plot(shelf, f"columns of W, {row}, to unit length", path), keys(shelf, f"{path}/keys"), shares=[8, 1])
-        for row, path in zip(rows, found, strict=True)
+        for row, path in found.items()
     ]
     values = column(*charts(shelf, "{1}: singular values of W", "identify/*/singular_values", NARROW))
-    return side_by_side("excitation", _in_grid("columns", W), values, shares=[2, 1]) if rows else None
+    return side_by_side("excitation", _in_grid("columns", W), values, shares=[2, 1]) if found else None
 
 
 def iterations(shelf: Shelf) -> Part:
@@ -169,8 +168,7 @@ def parameters(shelf: Shelf) -> Part:
     if not found:  # of a log that still grows
         return running
     if len(found) == len(shelf.methods):  # few parameters: everything beside each other
-        shown = tabbed([grid("all", found, 1), table], "estimates")
-        return side_by_side("parameters", shown, running, shares=[1, 1])
+        return side_by_side("parameters", tabbed([grid("all", found, 1), table], "estimates"), running, shares=[1, 1])
     return tabbed([grid("all", found, 3 if len(found) <= 2 * FEW else 4), running, table], "parameters")
 
 
@@ -188,9 +186,8 @@ def _estimates(shelf: Shelf, names: Sequence[str]) -> Part:
 
 
 def _estimate(shelf: Shelf, name: str) -> Part:
-    return plot(
-        shelf, with_unit(name, _known_units().get(_letters(name), "")), f"identify/*/*/estimate/{name}", f"truth/{name}"
-    )
+    title = with_unit(name, _known_units().get(_letters(name), ""))
+    return plot(shelf, title, f"identify/*/*/estimate/{name}", f"truth/{name}")
 
 
 def _fits(shelf: Shelf, rows: Sequence[str]) -> Iterator[Part]:
@@ -201,16 +198,8 @@ def _fits(shelf: Shelf, rows: Sequence[str]) -> Iterator[Part]:
 
 def residuals(shelf: Shelf) -> list[Part]:
     """Return the residuals of the models, a plot for each kind of row."""
-    return [
-        plot(
-            shelf,
-            f"residual {row} [{_unit(row)}]",
-            *_of_models(shelf, "residual", row),
-            *_of_models(shelf, "explained", row),
-            legend=_many(shelf),
-        )
-        for row in _rows(shelf)
-    ]
+    curves = {row: [*_of_models(shelf, "residual", row), *_of_models(shelf, "explained", row)] for row in _rows(shelf)}
+    return [plot(shelf, f"residual {row} [{_unit(row)}]", *each, legend=_many(shelf)) for row, each in curves.items()]
 
 
 def _many(shelf: Shelf) -> bool:
@@ -252,9 +241,8 @@ def _order(name: str) -> tuple[int, int]:
 @cache
 def _known_units() -> dict[str, str]:
     """Return the units of the parameters of links and of the blocks that are built in, by their letters."""
-    blocks = [BLOCKS.create(name) for name in BLOCKS.builtin]
-    each = [parameter for block in blocks for parameter in block.parameters(2)]
-    every = (*each, *scara().parameters)
+    of_blocks = [parameter for name in BLOCKS.builtin for parameter in BLOCKS.create(name).parameters(2)]
+    every = (*of_blocks, *scara().parameters)
     return {x: unit for x, (_, unit) in KINDS.items()} | {_letters(p.name): p.unit for p in every}
 
 

@@ -104,10 +104,9 @@ class Stream:
     def keep_sizes(self) -> None:
         """Send the rms of the curves so far, as names of entities: layouts see names alone, and an axis may read only 0."""
         for path, (count, squares) in self._squares.items():
-            if path.startswith("truth/"):
-                continue
-            rms = np.sqrt(squares / max(count, 1))
-            self.keep(f"{SIZES}/{compact(rms.min())}_{compact(rms.max())}/{path}", rr.TextDocument(path))
+            if not path.startswith("truth/"):
+                rms = np.sqrt(squares / max(count, 1))
+                self.keep(f"{SIZES}/{compact(rms.min())}_{compact(rms.max())}/{path}", rr.TextDocument(path))
 
     def curve(self, path: str, times: Times, values: Array, name: str, color: Color, width: float) -> None:
         """Announce one curve, once, and send values of shape (time,)."""

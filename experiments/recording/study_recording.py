@@ -50,16 +50,19 @@ class AxisCharts:
 
     def send(self, worst: Sequence[Worst]) -> None:
         """Send the typical error, and that of every parameter with its runs, the worst of them by name."""
-        at, typical = f"study/{part(self.axis.field)}", [PERCENT * cell.typical for cell in self.cells]
-        chart = Chart(self.stream, f"{at}/typical", self._x, decades("typical error [%]", typical))
+        path, typical = f"study/{part(self.axis.field)}", [PERCENT * cell.typical for cell in self.cells]
+        chart = Chart(self.stream, f"{path}/typical", self._x, decades("typical error [%]", typical))
         for line in self._lines.values():
             self._draw(chart, line, np.array([PERCENT * cell.typical for cell in line]))
-            self._name_others(chart, line)
+            others = [in_words(v) for name, v in line[0].settings.items() if name != self.axis.field]
+            if others and line[0].names[2] == self._models[0]:  # they stand at the end of lines, of the first model only
+                at = np.array([self._place(line[-1])]), np.array([PERCENT * line[-1].typical])
+                chart.write(f"others/{'_'.join([*line[0].names, *others])}", *at, [", ".join(others)])
         for name, color in self._legend.items():
             chart.list_entry(name, color)
         for p, name in enumerate(self.cells[0].parameters):
             if all(cell.relative[p] for cell in self.cells):
-                self._parameter(f"{at}/parameters/{p:02}/{part(name)}", p, [w for w in worst if w[1] == name])
+                self._parameter(f"{path}/parameters/{p:02}/{part(name)}", p, [w for w in worst if w[1] == name])
 
     @property
     def _x(self) -> Words:
@@ -116,13 +119,6 @@ class AxisCharts:
         chart.line(name, x, y, color, listed=False)
         chart.marks(name, x, y, color, self._symbol(line[0].names[:2]))
 
-    def _name_others(self, chart: Chart, line: Sequence[Cell]) -> None:
-        """Write the values of the other axes at the end of a line, of the first model only."""
-        others = [in_words(v) for name, v in line[0].settings.items() if name != self.axis.field]
-        if others and line[0].names[2] == self._models[0]:
-            at = np.array([self._place(line[-1])]), np.array([PERCENT * line[-1].typical])
-            chart.write(f"others/{'_'.join([*line[0].names, *others])}", *at, [", ".join(others)])
-
     def _parameter(self, path: str, p: int, worst: Sequence[Worst]) -> None:
         """Send the rms error of a parameter, its runs as dots, and the worst of them."""
         sizes = [np.maximum(PERCENT * np.abs(cell.error[:, p]), PERCENT * MIN_ERROR) for cell in self.cells]
@@ -151,7 +147,6 @@ class AxisCharts:
 
 
 _SIGNS: dict[Symbol, str] = {"square": "□", "triangle": "△", "diamond": "◇", "cross": "x", "circle": "o"}
-
 
 EDGES = np.arange(-6.25, 6.3, 0.5)  # Bins of errors in sigma; what lies beyond counts in the outermost
 

@@ -68,10 +68,9 @@ def start_viewer() -> str:
 
 def _start(options: list[str], port: int) -> "subprocess.Popen[bytes]":
     quiet, binary = subprocess.DEVNULL, viewer_binary()
+    words = [str(binary), "--bind", LOOPBACK, *options]
     try:
-        viewer = subprocess.Popen(
-            [binary, "--bind", LOOPBACK, *options], stdin=quiet, stdout=quiet, stderr=quiet, start_new_session=True
-        )
+        viewer = subprocess.Popen(words, stdin=quiet, stdout=quiet, stderr=quiet, start_new_session=True)
     except OSError as error:
         raise ExperimentError(f"cannot start the rerun viewer {binary}: {error.strerror}") from error
     end = time.perf_counter() + PATIENCE

@@ -22,19 +22,14 @@ class Shelf:
         named = [path.strip("/") for path in paths]
         stripped = [path for path in named if not path.startswith(f"{SIZES}/")]
         self.sizes = {path: size.split("_") for _, size, path in (name.split("/", 2) for name in set(named) - set(stripped))}
-        numbered = sorted(path.split("/")[1:] for path in stripped if path.startswith("joints/"))
-        self.joints = [joint for _, joint in numbered]
-        self.paths = sorted(stripped, key=self._place)
+        self.joints = [joint for _, joint in sorted(path.split("/")[1:] for path in stripped if path.startswith("joints/"))]
+        rank = {joint: f"{number:03}" for number, joint in enumerate(self.joints)}  # joints by their order in the robot
+        self.paths = sorted(stripped, key=lambda path: [rank.get(part, part) for part in path.split("/")])
         self._ending: dict[tuple[int, str], list[tuple[str, list[str]]]] = {}
         for path in self.paths:  # an arm of seven joints has thousands of paths, and layouts ask a thousand times
             parts = path.split("/")
             for end in (parts[-1], "*"):
                 self._ending.setdefault((len(parts), end), []).append((path, parts))
-
-    def _place(self, path: str) -> list[str]:
-        """Sort key of paths: their names, but joints by their order in the robot."""
-        rank = {joint: f"{number:03}" for number, joint in enumerate(self.joints)}
-        return [rank.get(part, part) for part in path.split("/")]
 
     def of(self, *patterns: str) -> list[str]:
         """Return the entities that match one of the patterns, in which * stands for one part of a path."""
@@ -47,8 +42,7 @@ class Shelf:
 
     def rms(self, paths: Iterable[str]) -> str:
         """Size of curves for a title: the viewer's axes may have no number but 0."""
-        known = [size for path in paths for size in self.sizes.get(path, ())]
-        if not known:
+        if not (known := [size for path in paths for size in self.sizes.get(path, ())]):
             return ""
         low, high = min(known, key=float), max(known, key=float)
         return f", rms {high}" if low == high else f", largest rms {high}"
@@ -68,13 +62,11 @@ def plot(shelf: Shelf, name: str, *patterns: str, legend: bool = False) -> Part:
 
     A legend, in which curves can be switched off and on, covers some of them: `keys` is one for all views.
     """
-    found = shelf.of(*patterns)
-    if not found:
+    if not (found := shelf.of(*patterns)):
         return None
     name += shelf.rms(found)
     linked = rrb.TimeAxis(link=rrb.components.LinkAxis.LinkToGlobal)
-    shown = rrb.PlotLegend(visible=legend)
-    return rrb.TimeSeriesView(name=name, contents=_contents(found), axis_x=linked, plot_legend=shown)
+    return rrb.TimeSeriesView(name=name, contents=_contents(found), axis_x=linked, plot_legend=rrb.PlotLegend(visible=legend))
 
 
 def window(shelf: Shelf, name: str, *patterns: str) -> Part:
@@ -111,10 +103,10 @@ def keys(shelf: Shelf, *patterns: str) -> Part:
 
 def text(shelf: Shelf, *patterns: str) -> Part:
     """Return the texts, one behind the other, if there are any."""
-    titles = {
-        path: path.split("/")[1] if path.startswith(("identify/", "attribution/")) else path for path in shelf.of(*patterns)
-    }
-    found = [rrb.TextDocumentView(origin=f"/{path}", name=title) for path, title in titles.items()]
+    found = [
+        rrb.TextDocumentView(origin=f"/{path}", name=path.split("/")[1] if "/" in path else path)
+        for path in shelf.of(*patterns)
+    ]
     return rrb.Tabs(*found, active_tab=len(found) - 1, name="texts") if len(found) > 1 else next(iter(found), None)
 
 
@@ -135,8 +127,7 @@ def column(*parts: Part, shares: Sequence[float] | None = None, name: str | None
 
 def side_by_side(name: str, *parts: Part, shares: Sequence[float]) -> Part:
     """Return the parts that there are, side by side, under a name; none if there are none."""
-    there = [(part, share) for part, share in zip(parts, shares, strict=True) if part is not None]
-    if not there:
+    if not (there := [(part, share) for part, share in zip(parts, shares, strict=True) if part is not None]):
         return None
     return rrb.Horizontal(*(p for p, _ in there), column_shares=[s for _, s in there], name=name)
 

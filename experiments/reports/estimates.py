@@ -66,8 +66,7 @@ class EstimatesTable:
     @property
     def _shown(self) -> list[tuple[int, str]]:
         """Places and names of the parameters but for smooth functions, which are no physical ones."""
-        names = self.fit.basis.names
-        return [(i, names[i]) for i in self.fit.basis.without_random_effects]
+        return [(i, self.fit.basis.names[i]) for i in self.fit.basis.without_random_effects]
 
     @cached_property
     def legend(self) -> str:

@@ -73,8 +73,7 @@ def _print_limits(console: Console, found: Excited) -> None:
     of = {"torque": f"torque, of\n{found.design.asked.torque_share:.0%}"}
     grid = new_table("", [of.get(name, name.replace(" ", "\n", 1)) for name in largest])
     for j, joint in enumerate(found.use.joints):
-        cells = (f"{100 * share[j]:.0f} %{'!' if share[j] > BINDING else ' '}" for share in largest.values())
-        grid.add_row(joint, *cells)
+        grid.add_row(joint, *(f"{100 * share[j]:.0f} %{'!' if share[j] > BINDING else ' '}" for share in largest.values()))
     print_titled(console, "shares of the limits in use, checked at 1 kHz; ! marks active limits", grid)
 
 
@@ -159,10 +158,7 @@ def _motion_figure(found: Excited) -> str:
     """Return positions, velocities and torques of all joints, as shares of their limits."""
     d, step = found.design, max(1, round(FS / PLOTTED))
     motion = d.trajectory(found.c, 1).motion(d.robot_model.robot).sample(FS)
-    shown = {
-        "position": (motion.q - d.limits.middle) / d.limits.sizes[0],
-        "velocity": motion.qd / d.limits.velocity,
-    }
+    shown = {"position": (motion.q - d.limits.middle) / d.limits.sizes[0], "velocity": motion.qd / d.limits.velocity}
     there = shown | {name: share for name, share in found.use.shares.items() if name == "torque"}
     figure = Figure(figsize=(11, 1.7 * len(there) + 0.4), layout="constrained")
     panels = list(np.atleast_1d(figure.subplots(len(there), 1, sharex=True)))
@@ -182,10 +178,8 @@ def _told_figure(found: Excited) -> str:
     names, shares = found.design.robot_model.basis.names, 100 * found.shares
     figure = Figure(figsize=(11, 0.13 * len(names) + 1.1), layout="constrained")
     panel = figure.subplots()
-    d = found.design
-    image = panel.imshow(
-        shares.T, aspect="auto", cmap="viridis", vmin=0, extent=(0, d.duration, len(names) - 0.5, -0.5), interpolation="nearest"
-    )
+    extent = (0, found.design.duration, len(names) - 0.5, -0.5)
+    image = panel.imshow(shares.T, aspect="auto", cmap="viridis", vmin=0, extent=extent, interpolation="nearest")
     panel.set_yticks(np.arange(len(names)), names, fontsize=6)
     panel.set_xlabel("time [s]")
     panel.grid(visible=False)

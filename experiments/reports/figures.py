@@ -4,19 +4,16 @@ from importlib.resources import files
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from jinja2 import Environment
 
-from idbench.experiments.identification.causes import Cause
 from idbench.experiments.identification.fit import Fit
 from idbench.experiments.judgement.held_out import HeldOut
 from idbench.experiments.reports.estimates import all_units
 from idbench.experiments.reports.friction_curves import FRICTIONS, WHOLE, FrictionCurves, residual_instants, spectra
 from idbench.experiments.reports.panels import Panel, PanelAxis, figure
 from idbench.experiments.text import model_color, percentage
-from idbench.identify import Array, cutoffs
+from idbench.identify import cutoffs
 from idbench.identify.arrays import TINY
-from idbench.identify.rows.rows import Rows
 
 
 def rendered(package: str, template: str, **words: Any) -> str:
@@ -63,13 +60,13 @@ def residuals_figure(one: HeldOut) -> str:
 
 def causes_figure(fit: Fit) -> str:
     """Return residuals of the fit where each mistake that they show explains most of them, and what it explains."""
-    every = [cause for cause in fit.diagnosis or () if cause.suspect.explained is not None]
-    if not every:
+    if not (every := [(cause, x) for cause in fit.diagnosis or () if (x := cause.suspect.explained) is not None]):
         return ""
     rows, X = fit.problem.explicit.rows, fit.estimates[fit.leading].X
     residual, panels = rows.Y - rows.predicted(X), list[Panel]()
-    for cause in every:
-        own, explained = _most_explained(rows, cause)
+    for cause, explained in every:
+        squares, of_all = (np.sum(rows.by_kind(x * rows.valid) ** 2, axis=-1) for x in (explained, rows.Y))
+        own = rows.group == int(np.argmax(squares / np.maximum(of_all, TINY)))  # of the joint where it explains most
         time = np.arange(np.count_nonzero(own)) * np.median(np.diff(rows.time[own]))  # of several logs, one after the other
         shown = fit.robot_model.robot.joints[int(rows.group[own][0])]
         panel = Panel(f"{shown}: {cause.short}{f', of {cause.joint}' if cause.joint not in (None, shown) else ''}")
@@ -77,14 +74,6 @@ def causes_figure(fit: Fit) -> str:
             panel.line(time, np.where(rows.valid[own], values[own], np.nan), color, 1.2, label)
         panels.append(panel)
     return figure(panels, 1.6, "time [s]", f"[{all_units(fit.robot_model)[0]}]")
-
-
-def _most_explained(rows: Rows, cause: Cause) -> tuple[npt.NDArray[np.bool_], Array]:
-    """Rows of the joint where a mistake explains most, and the torque that it explains in all rows."""
-    explained = cause.suspect.explained
-    assert explained is not None
-    squares, of_all = (np.sum(rows.by_kind(x * rows.valid) ** 2, axis=-1) for x in (explained, rows.Y))
-    return rows.group == int(np.argmax(squares / np.maximum(of_all, TINY))), explained
 
 
 def friction_figure(fit: Fit) -> str:
@@ -118,14 +107,13 @@ def spectra_figure(fit: Fit) -> str:
     panels = list[Panel]()
     for found in every:
         top = float(found.lines[form].max())
-        panel = Panel(
-            f"{found.row} [{found.unit}/\u221aHz]", PanelAxis(log=True), PanelAxis(log=True, limits=(top * 1e-5, top * 3))
-        )
+        ends = top * 1e-5, top * 3
+        panel = Panel(f"{found.row} [{found.unit}/\u221aHz]", PanelAxis(log=True), PanelAxis(log=True, limits=ends))
         for name, density in found.lines.items():
             color, dash = NOISES.get(name, (color_of(form), ""))
             panel.line(found.f, density, color, 1.0, "residual" if name == form else name, dash)
         for cutoff in cutoffs(fit.processing, fit.logs.fitted[0].fs).values():
-            panel.line(np.array([cutoff, cutoff]), np.array([top * 1e-5, top * 3]), "#cccccc")
+            panel.line(np.array([cutoff, cutoff]), np.array(ends), "#cccccc")
         panels.append(panel)
     return figure(panels, 1.6, "frequency [Hz]")
 

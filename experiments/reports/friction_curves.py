@@ -56,8 +56,7 @@ def spectra(fit: Fit, left: Mapping[str, Instants]) -> Iterator[Spectrum]:
         lines = {form: _density(one, j, fs) for form, one in joined.items()}
         f = next(iter(lines.values()))[0]
         if "explicit" in joined and not noise:
-            levels = alone.estimates["explicit"].noise_levels
-            each = noise_spectra(alone.problem, levels, f)
+            each = noise_spectra(alone.problem, alone.estimates["explicit"].noise_levels, f)
             noise = dict(zip(("torque noise", "position noise"), each, strict=True))
         shown = {form: density for form, (_, density) in lines.items()} | {kind: each[j] for kind, each in noise.items()}
         yield Spectrum(joint, j, fit.robot_model.units(j)[0], f[1:], {name: density[1:] for name, density in shown.items()})
@@ -115,8 +114,7 @@ class FrictionCurves:
     def laws(self, j: int) -> Iterator[tuple[Array, Array]]:
         """Yield the law of a joint, with each of some loads where it depends on that: velocity [rad/s], friction [N m]."""
         v, *_, weight = self.rows(j)
-        fastest = BEYOND * max(np.abs(v[weight > WHOLE]).max(initial=0.0), 1e-3)
-        side = np.linspace(0, fastest, POINTS)[1:]
+        side = np.linspace(0, BEYOND * max(np.abs(v[weight > WHOLE]).max(initial=0.0), 1e-3), POINTS)[1:]
         v = np.concatenate([-side[::-1], [0.0], side])
         for load in self._loads(j):
             torque = self._at(j, v, load)
@@ -139,11 +137,9 @@ class FrictionCurves:
     def _loads(self, j: int) -> list[float]:
         """Return the loads at which a law of a joint is drawn: one, if it depends on none."""
         own = [block for block in self._laws[0].blocks if not isinstance(block, OfJoints) or j in block.joints]
-        law = next((law for law in map(block_of_all_joints, own) if isinstance(law, LoadFriction)), None)
-        if law is None:
+        if (law := next((law for law in map(block_of_all_joints, own) if isinstance(law, LoadFriction)), None)) is None:
             return [0.0]
-        load = np.abs(law.load(self.fit.problem.signals[0].state)[j])
-        return [float(x) for x in np.quantile(load, LOADS)]
+        return [float(x) for x in np.quantile(np.abs(law.load(self.fit.problem.signals[0].state)[j]), LOADS)]
 
     @cached_property
     def _laws(self) -> tuple[Basis, Array]:

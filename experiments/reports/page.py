@@ -105,6 +105,7 @@ def report(
     fit, robot_model = judgement.fit, judgement.fit.robot_model
     lead = fit.estimates[fit.leading]
     hardest = judgement.hardest
+    alike = {} if hardest is None else hardest.alike
     cutoff = getattr(fit.processing.operator, "cutoff", None)
     return rendered(
         "idbench.experiments.reports",
@@ -113,7 +114,7 @@ def report(
         subtitle=f"{robot_model.tree.n} joints, {len(fit.basis.names)} parameters, {fit.request.method.estimator_name}",
         warnings={about: messages for about, messages in warnings.items() if messages},
         answer=answer,
-        verdicts=[] if hardest is None else list(_verdicts(hardest)),
+        verdicts=[(f"{' and '.join(of)} model{'s' * (len(of) > 1)}", *verdict) for verdict, of in alike.items()],
         unjudged="; ".join(one.why for one in judgement.on if isinstance(one, Unjudged)),
         failures=fit.failures,
         unseen=[_held_out(one, attempts) for one in judgement.held_out],
@@ -147,11 +148,6 @@ def report(
 def _figure(attempts: Attempts, name: str, draw: Callable[[], str]) -> str:
     """Return a figure, or nothing if it fails."""
     return attempts.attempt(f"the figure of {name} in report.html", draw) or ""
-
-
-def _verdicts(one: HeldOut) -> Iterator[tuple[str, str, str]]:
-    for (word, reasons), models in one.alike.items():
-        yield f"{' and '.join(models)} model{'s' if len(models) > 1 else ''}", word, reasons
 
 
 def _held_out(one: HeldOut, attempts: Attempts) -> tuple[str, str, str, list[str], list[list[str]]]:
@@ -195,7 +191,6 @@ def _ranges(fit: Fit) -> Iterator[list[str]]:
 def _logs(fit: Fit) -> Iterator[list[Any]]:
     errors = next(iter(fit.torque_errors.values()), None)
     for k, log in enumerate(fit.logs.fitted):
-        name = fit.logs.name(k)
         torque = f"{log.torque.meaning}, delay {log.torque.late}"
         left = [] if errors is None else [f"{x:.2g}" for x in errors[k]]
-        yield [name, f"{log.fs:.5g}", f"{log.samples / log.fs:.4g}", torque, *left]
+        yield [fit.logs.name(k), f"{log.fs:.5g}", f"{log.samples / log.fs:.4g}", torque, *left]

@@ -39,8 +39,7 @@ class PanelAxis:
         """Return its ends, for data."""
         if self.limits is not None:
             return self.limits
-        own = [x[np.isfinite(x) & ((x > 0) | (not self.log))] for x in every]
-        values = np.concatenate([*own, np.empty(0)])
+        values = np.concatenate([*(x[np.isfinite(x) & ((x > 0) | (not self.log))] for x in every), np.empty(0)])
         if not len(values):
             return (0.1, 1.0) if self.log else (0.0, 1.0)
         low, high = float(values.min()), float(values.max())
@@ -49,9 +48,8 @@ class PanelAxis:
 
     def numbers(self, low: float, high: float) -> dict[float, str]:
         """Round numbers on it, and their texts."""
-        if self.log:
-            return {x: f"{x:g}" for x in decade_values(low, high).tolist()}
-        return {x: f"{x:.6g}" for x in round_values(low, high).tolist()}
+        values = decade_values(low, high) if self.log else round_values(low, high)
+        return {x: f"{x:g}" for x in values.tolist()}
 
 
 @dataclass
@@ -160,22 +158,16 @@ def _panel(panel: Panel, wide: float, high: float) -> Iterator[str]:
 
 def _drawn(kind: str, x: Array, y: Array, color: str, width: float, columns: int) -> Iterator[str]:
     """Yield the elements of what is drawn, at places [px]."""
-    there = np.isfinite(x) & np.isfinite(y)
     if kind == "dots":
-        if len(x) > columns:  # more dots than that are a cloud, whatever they are
-            every = len(x) // columns + 1
-            x, y = x[::every], y[::every]
-            there = there[::every]
-        points = "".join(f"M{a:.1f},{b:.1f}h0" for a, b in zip(x[there].tolist(), y[there].tolist(), strict=True))
+        every = len(x) // columns + 1 if len(x) > columns else 1  # more dots than that are a cloud, whatever they are
+        shown = np.stack([x, y], axis=1)[::every]
+        points = "".join(f"M{a:.1f},{b:.1f}h0" for a, b in shown[np.isfinite(shown).all(axis=1)].tolist())
         yield f'<path d="{points}" stroke="{color}" stroke-width="{2 * width:g}" stroke-linecap="round"/>' if points else ""
         return
-    x, y = _thinned(x, y, columns)
-    there = np.isfinite(x) & np.isfinite(y)
-    breaks = np.flatnonzero(np.diff(there.astype(int)) != 0) + 1
-    path = ""
-    for a, b, own in zip(np.split(x, breaks), np.split(y, breaks), np.split(there, breaks), strict=True):
-        if own.any():
-            path += "M" + " ".join(f"{p:.1f},{q:.1f}" for p, q in zip(a.tolist(), b.tolist(), strict=True))
+    places = np.stack(_thinned(x, y, columns), axis=1)
+    runs = np.split(places, np.flatnonzero(np.diff(np.isfinite(places).all(axis=1).astype(int)) != 0) + 1)
+    there = [run for run in runs if np.isfinite(run).all() and len(run)]
+    path = "".join("M" + " ".join(f"{p:.1f},{q:.1f}" for p, q in run.tolist()) for run in there)
     dash = kind.removeprefix("line ").strip()
     dashed = f' stroke-dasharray="{dash}"' if dash else ""
     yield f'<path d="{path}" fill="none" stroke="{color}" stroke-width="{width:g}"{dashed}/>' if path else ""
@@ -190,6 +182,5 @@ def _thinned(x: Array, y: Array, columns: int) -> tuple[Array, Array]:
     shaped = y[: count * every].reshape(count, every)
     gone = ~np.isfinite(shaped)
     low, high = np.where(gone, np.inf, shaped).argmin(axis=1), np.where(gone, -np.inf, shaped).argmax(axis=1)
-    places = np.stack([low, high], axis=1) + every * np.arange(count)[:, None]
-    kept = np.unique(places.ravel())
+    kept = np.unique(np.stack([low, high], axis=1) + every * np.arange(count)[:, None])
     return x[kept], y[kept]

@@ -49,10 +49,9 @@ def _grid(table: EstimatesTable, width: int, *, complete: bool) -> Table:
     """Return the table of the parameters, and of the fit as a whole if it shall be complete."""
     heads, rows = [f"{first}\n{second}" for first, second in table.heads], list(table.rows())
     if len(table.estimates) == 1:
-        plain = ["", "value", "unit", "%sigma"] if table.fit.truth is None else ["", "unit", "true", "value", "%e", "%sigma"]
-        if table.fit.truth is None:
-            rows = [[name, value, unit, share] for name, unit, value, share in rows]
-        return _beside(plain, rows, width)
+        if table.fit.truth is not None:
+            return _beside(["", "unit", "true", "value", "%e", "%sigma"], rows, width)
+        return _beside(["", "value", "unit", "%sigma"], [[name, x, unit, share] for name, unit, x, share in rows], width)
     grid = new_table("", heads)
     for cells in rows:
         grid.add_row(*cells)
@@ -94,8 +93,7 @@ def _told(fit: Fit) -> Iterator[str]:
     logged = isinstance(fit.processing.alignment, AsLogged)
     asked = fit.robot_model.asked
     if asked.hold or asked.tie:
-        known = (("held", asked.hold), ("tied", asked.tie))
-        yield "; ".join(f"{what}: {', '.join(words)}" for what, words in known if words)
+        yield "; ".join(f"{what}: {', '.join(words)}" for what, words in (("held", asked.hold), ("tied", asked.tie)) if words)
     if not fit.logs.fitted[0].poses:
         is_early = channel.delay < -NEGLIGIBLE / fit.logs.fitted[0].fs and not channel.lags
         early = f" (it is logged {1e3 * -channel.delay:.4g} ms after it acts)" if is_early else ""
@@ -186,8 +184,7 @@ def _noise(fit: Fit) -> str:
     torque, position = (" ".join("?" if x is None else f"{x:.2g}" for x in fit.noise[kind]) for kind in ("torque", "position"))
     force, length = all_units(fit.robot_model)
     words = f"white noise of the log: torque {torque} {force}, position {position} {length}"
-    steps = fit.noise["encoder_step"]
-    if not any(steps):
+    if not any(steps := fit.noise["encoder_step"]):
         return words
     each = zip(steps, fit.robot_model.tree.joints, strict=True)
     bits = " ".join("-" if joint.kind == "slide" else f"{log2(2 * pi / step):.1f}" if step else "?" for step, joint in each)

@@ -32,8 +32,7 @@ def print_held_out(console: Console, one: HeldOut | Unjudged, whole: Sequence[st
     grid, first = new_table("", [*heads, "noise %, at most"]), next(iter(torques.values()))
     for j, joint in enumerate(joints):
         noise = percentage(first.percent_of_level(first.noise)[j])
-        cells = (cell for model in torques for cell in _held_out_cells(one, model, j)[: len(what)])
-        grid.add_row(joint, *cells, noise)
+        grid.add_row(joint, *(cell for model in torques for cell in _held_out_cells(one, model, j)[: len(what)]), noise)
     title = f"torque error{'' if one.log.poses else ' while moving'}{', position error of the simulated robot' * simulated}"
     print_titled(console, f"{one.title}: {title}", grid)
     for model in (model for model, v in one.verdicts.items() if model in torques and v.unsimulated):

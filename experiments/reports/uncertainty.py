@@ -29,11 +29,9 @@ def words_of_uncertainty(fit: Fit) -> Iterator[str]:
         each = [f"{a} and {b} ({r:+.2f})" if b != DELAY else f"{a} and {b} ({r:.2f}, of its size)" for a, b, r in pairs[:NAMED]]
         yield f"strongly correlated: {', '.join(each)}{_more(len(pairs))}"
     if estimate.between_logs is not None:
-        share = np.sqrt(estimate.between_logs.variance) / np.maximum(np.abs(estimate.X), TINY)
-        order = [
-            k for k in np.argsort(-share) if share[k] > DISTINCT and abs(estimate.X[k]) > SHOWN * estimate.standard_errors[k]
-        ]
-        if order:
+        X, sigma = estimate.X, estimate.standard_errors
+        share = np.sqrt(estimate.between_logs.variance) / np.maximum(np.abs(X), TINY)
+        if order := [k for k in np.argsort(-share) if share[k] > DISTINCT and abs(X[k]) > SHOWN * sigma[k]]:
             each = [f"{estimate.names[k]} {100 * share[k]:.2g} %" for k in order[:NAMED]]
             yield f"from log to log parameters move, beyond what one log shows, by {', '.join(each)}{_more(len(order))}"
     error, seconds = estimate.model_error, sum(log.samples / log.fs for log in fit.logs.fitted)
@@ -67,8 +65,7 @@ def correlated(estimate: Estimate) -> list[tuple[str, str, float]]:
     R = C / np.outer(sigma, sigma)
     of_functions = [p.is_random_effect for p in estimate.problem.basis.parameters]
     R[of_functions], R[:, of_functions] = 0.0, 0.0
-    strong = np.argwhere(np.triu(np.abs(R), 1) > STRONG)
-    found = [(estimate.names[i], estimate.names[j], float(R[i, j])) for i, j in strong]
+    found = [(estimate.names[i], estimate.names[j], float(R[i, j])) for i, j in np.argwhere(np.triu(np.abs(R), 1) > STRONG)]
     if estimate.delay_covariance.any():
         of_delay = np.sqrt(np.maximum(np.diagonal(estimate.delay_covariance), 0.0)) / sigma
         found += [(estimate.names[k], DELAY, float(of_delay[k])) for k in np.flatnonzero(of_delay > STRONG)]

@@ -135,8 +135,7 @@ class ResultsFolder:
     def add(self, name: str, content: str | bytes) -> None:
         """Write one further file; errors as `complete`."""
         with self.more() as hidden:
-            whole = content if isinstance(content, bytes) else content.encode("utf-8", "backslashreplace")
-            (hidden / name).write_bytes(whole)
+            (hidden / name).write_bytes(content if isinstance(content, bytes) else content.encode("utf-8", "backslashreplace"))
 
     @contextmanager
     def _exchanged(self, *, complete: bool) -> Iterator[Path]:
@@ -154,8 +153,7 @@ class ResultsFolder:
         gone -= {path.name for path in paths}
         kept = {} if complete or self.force else manifest.files  # of another command, and only laid out anew
         commands = {path.name: kept[path.name].command if path.name in kept else self.command for path in paths}
-        written = {path.name: WrittenFile(commands[path.name], (digest(path),)) for path in paths}
-        manifest.save(written, gone)
+        manifest.save({path.name: WrittenFile(commands[path.name], (digest(path),)) for path in paths}, gone)
         for path in paths:
             try:
                 unchanged = path.name in own and manifest.owns(path.name)  # looked at once more

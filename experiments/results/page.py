@@ -102,7 +102,6 @@ def _lines(console: Console, what: str) -> Iterator[Told]:
 
 WIDTH = 144  # Characters of a line where no terminal says how many it has
 
-
 COLORS = {"good": "green", "fair": "yellow", "poor": "red"}  # Of the verdicts
 NOT_SAVED = "not saved: --out FOLDER keeps it, with a report and a recording"  # What is said where nobody named a folder
 

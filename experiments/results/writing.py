@@ -23,8 +23,7 @@ from idbench.identify import Estimate
 
 def write_summary(path: Path, summary: dict[str, Any]) -> None:
     """Write `summary` as JSON, with the version of idbench."""
-    text = json.dumps({"version": version("idbench"), **summary}, indent=2, allow_nan=False)
-    path.write_text(text + "\n", encoding="utf-8")
+    path.write_text(json.dumps({"version": version("idbench"), **summary}, indent=2, allow_nan=False) + "\n", encoding="utf-8")
 
 
 def summarize(estimate: Estimate, truth: list[float] | None) -> dict[str, Any]:

@@ -1,7 +1,6 @@
 """An example to work on: the file of an arm, two logs that it recorded, and its true parameters."""
 
 import tempfile
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -36,13 +35,8 @@ def example_files(name: str) -> dict[str, str]:
             path = Path(folder) / file
             write_log(done.alone(), path)
             contents[file] = path.read_text(encoding="utf-8")
-    contents["truth.csv"] = _table(robot, done.truth)
-    return contents
-
-
-def _table(robot: Robot, standard: Mapping[str, float]) -> str:
-    """Return the true base parameters as CSV."""
     tree = kinematic_tree(robot)
     base = BaseParameters.of(tree, tree_basis(tree))
-    rows = zip(base.values(standard).items(), base.basis.units, strict=True)
-    return "".join(["parameter,value,unit\n", *(f"{name},{x:.6g},{unit}\n" for (name, x), unit in rows)])
+    rows = zip(base.values(done.truth).items(), base.basis.units, strict=True)
+    truth = [f"{parameter},{x:.6g},{unit}\n" for (parameter, x), unit in rows]
+    return contents | {"truth.csv": "".join(["parameter,value,unit\n", *truth])}

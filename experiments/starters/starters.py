@@ -82,12 +82,8 @@ def new_plugin(name: str, kind: str, out: Path) -> None:
     source = files("idbench.experiments.starters").joinpath("plugins", f"{kind}.py").read_text(encoding="utf-8")
     if any(name in table for table in TABLES):
         raise ExperimentError(f"{name!r} is the name of a plug-in already, which would be used instead: choose another")
-    if (
-        iskeyword(module)
-        or iskeyword(made)
-        or re.search(rf"\b(class|import|as) {made}\b|\b{made}\(", source)
-        or find_spec(module)
-    ):
+    hides = re.search(rf"\b(class|import|as) {made}\b|\b{made}\(", source)
+    if iskeyword(module) or iskeyword(made) or hides or find_spec(module):
         raise ExperimentError(f"{name!r} is taken, by a module {module} or by a class that {made} would hide: add a word")
     contents = {
         f"{module}.py": re.sub(r"\bStarter\b", made, source),

@@ -145,8 +145,7 @@ class Basis:
         """Return the basis of the blocks that depend on no estimate, with all that is held, and that of the others."""
         nonlinear = {parameter for block in self.blocks if block.is_nonlinear for parameter in block.parameters(self.n)}
         fixed = [parameter for parameter in self.parameters if parameter not in nonlinear]
-        rest = [parameter for parameter in self.parameters if parameter in nonlinear]
-        return self.of(fixed), replace(self, held={}).of(rest)
+        return self.of(fixed), replace(self, held={}).of([parameter for parameter in self.parameters if parameter in nonlinear])
 
     @cached_property
     def operating_point(self) -> dict[int, Array | float]:

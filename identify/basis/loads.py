@@ -74,8 +74,7 @@ class PayloadLink(AbstractConservativeBlock, AbstractColumns):
 
     def parameters(self, n: int) -> tuple[Parameter, ...]:
         """Return the ten parameters; raise SettingError unless the tree has `n` joints."""
-        own = [p for p in self._links.parameters(n) if p.joint == self.link]
-        if not own:
+        if not (own := [p for p in self._links.parameters(n) if p.joint == self.link]):
             raise SettingError(f"joint {self.tree.joints[self.link].name} moves no link with mass that could hold a payload")
         return tuple(map(_own, own))
 
@@ -85,12 +84,9 @@ class PayloadLink(AbstractConservativeBlock, AbstractColumns):
 
     def columns(self, function: str, state: State) -> BlockColumns:
         """Return those of the link, in the share of the payload that is held."""
-        share = state.condition(HELD_SHARE)[..., 0, :]
-        if not np.any(share):
+        if not np.any(share := state.condition(HELD_SHARE)[..., 0, :]):
             return {}
-        return {
-            (row, _own(parameter)): share * column for (row, parameter), column in self._links.columns(function, state).items()
-        }
+        return {(row, _own(p)): share * column for (row, p), column in self._links.columns(function, state).items()}
 
     @cached_property
     def _links(self) -> TreeLinks:

@@ -44,9 +44,7 @@ class OfJoints(AbstractColumns):
 
     def operating_point(self, n: int) -> Mapping[Parameter, Array | float]:
         """Return the operating point of the joints' nonlinear parameters."""
-        return {
-            parameter: value for parameter, value in self.block.operating_point(n).items() if parameter.joint in self.joints
-        }
+        return {p: value for p, value in self.block.operating_point(n).items() if p.joint in self.joints}
 
 
 def block_of_all_joints(block: AbstractBlock) -> AbstractBlock:

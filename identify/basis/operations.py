@@ -7,14 +7,10 @@ from idbench.identify.basis.basis import Basis
 from idbench.identify.basis.loads import HELD_SHARE
 from idbench.identify.basis.replay import motion_of_symbols
 from idbench.identify.basis.symbols import flat, inputs
-from idbench.identify.basis.tape import Symbol, Tape, Value
+from idbench.identify.basis.tape import Symbol, Tape
 from idbench.identify.signals.signals import State
 
-COLUMNS = {
-    "explicit": ("explicit",),
-    "implicit": ("remainder", "momentum"),
-    "power": ("dissipation", "energy"),
-}
+COLUMNS = {"explicit": ("explicit",), "implicit": ("remainder", "momentum"), "power": ("dissipation", "energy")}
 """Model -> the columns c and e that it takes from a basis."""
 
 
@@ -55,7 +51,10 @@ def operations(basis: Basis, model: str) -> Operations:
     """
     tape = Tape()
     state = recorded_state(tape, basis.n)
-    columns = {what: _columns(basis, state, what) for what in COLUMNS[model]}
+    columns = {
+        what: [x for block in basis.blocks for column in getattr(block, what)(state).values() for x in flat(column)]
+        for what in COLUMNS[model]
+    }
     needed = tape.needed(x for each in columns.values() for x in each)
     counts = Counter(_COUNTED.get(tape.steps[number][0], "functions") for number in needed)
     held = sum(isinstance(x, Symbol) for what in ("momentum", "energy") for x in columns.get(what, ()))
@@ -71,8 +70,3 @@ def recorded_state(tape: Tape, n: int) -> State:
     q, qd, qdd = (inputs(tape, name, n) for name in ("q", "qd", "qdd"))
     conditions = {"temperature": inputs(tape, "temperature", n), HELD_SHARE: inputs(tape, HELD_SHARE, 1)}
     return motion_of_symbols(q, qd, qdd, conditions=conditions)
-
-
-def _columns(basis: Basis, state: State, what: str) -> list[Value]:
-    """Return the columns of all blocks."""
-    return [x for block in basis.blocks for column in getattr(block, what)(state).values() for x in flat(column)]

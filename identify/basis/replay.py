@@ -61,10 +61,8 @@ class Program(Generic[Key]):
                 places[number] = free.pop()
             steps.append((NUMBERS[operation], given, places[number]))
         self._constants, first = list(constants), kept + self._scratch
-        self._steps = [
-            (function, [first + constants[x] if isinstance(x, float) else x for x in given], at)
-            for function, given, at in steps
-        ]
+        numbered = {x: first + k for x, k in constants.items()}
+        self._steps = [(f, [numbered[x] if isinstance(x, float) else x for x in given], at) for f, given, at in steps]
 
     def of(self, state: State) -> dict[Key, Array]:
         """Return the values along a motion, (..., time) each."""

@@ -98,5 +98,4 @@ class Balancer(AbstractWithoutMomentum, AbstractConservativeBlock):
         """Return l - least and dl/dq."""
         angle = q - self.zero
         length = np.sqrt(self.a**2 + self.b**2 - 2 * self.a * self.b * np.cos(angle))
-        long = np.maximum(length, 1e-9)
-        return length - abs(self.a - self.b), self.a * self.b * np.sin(angle) / long
+        return length - abs(self.a - self.b), self.a * self.b * np.sin(angle) / np.maximum(length, 1e-9)

@@ -179,10 +179,6 @@ def _power(tape: Tape, a: Value, b: Value) -> Value | None:
     return tape.apply("*", tape.apply("*", half, half), a) if b % 2 else tape.apply("*", half, half)
 
 
-def _choice(_: Tape, condition: Value, a: Value, b: Value) -> Value | None:
-    return None if isinstance(condition, Symbol) else a if condition else b
-
-
 _RULES: dict[str, Callable[..., Value | None]] = {
     "+": _sum,
     "-": _difference,
@@ -190,5 +186,5 @@ _RULES: dict[str, Callable[..., Value | None]] = {
     "/": _quotient,
     "**": _power,
     "negate": Tape.negated,
-    "where": _choice,
+    "where": lambda _, condition, a, b: None if isinstance(condition, Symbol) else a if condition else b,
 }

@@ -66,9 +66,7 @@ class Wrench(NamedTuple):
         """Return force and moment that move a link, with its weight: a = dv + w x v - g, Newton and Euler."""
         v, w = V
         squares = times(w.x, w.x), times(w.y, w.y), times(w.z, w.z)
-        xy = times(w.x, w.y)
-        xz = times(w.x, w.z)
-        yz = times(w.y, w.z)
+        xy, xz, yz = times(w.x, w.y), times(w.x, w.z), times(w.y, w.z)
         d = dV.w
         A = (
             Vector(times(-1.0, plus(squares[1], squares[2])), minus(xy, d.z), plus(xz, d.y)),
@@ -233,8 +231,7 @@ def tree_basis(tree: KinematicTree, laws: tuple[AbstractBlock, ...] = (ViscousFr
     blocks = TreeLinks(tree), OfJoints(Armature(), driven), *springs, *laws, *_of_couplings(tree, laws)
     parameters = [parameter for block in blocks for parameter in block.parameters(tree.n)]
     kept = tuple(sorted(parameters, key=lambda p: -1 if p.joint is None else p.joint))
-    slides = tuple(j for j, joint in enumerate(tree.joints) if joint.kind == "slide")
-    return Basis(tree.n, blocks, kept, slides)
+    return Basis(tree.n, blocks, kept, tuple(j for j, joint in enumerate(tree.joints) if joint.kind == "slide"))
 
 
 def _of_couplings(tree: KinematicTree, laws: tuple[AbstractBlock, ...]) -> Iterator[AbstractBlock]:

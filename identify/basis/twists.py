@@ -193,12 +193,8 @@ class Twists:
             qd, qdd = self._state.qd[..., j, :], self._state.qdd[..., j, :]
             carried = at.carry(found[parent]) if parent != GROUND else STILL
             turning = bracket(self.velocity[j], at.S)
-            found.append(
-                Twist(
-                    add(carried.v, scaled(qdd, at.S.v), scaled(qd, turning.v)),
-                    add(carried.w, scaled(qdd, at.S.w), scaled(qd, turning.w)),
-                )
-            )
+            v = add(carried.v, scaled(qdd, at.S.v), scaled(qd, turning.v))
+            found.append(Twist(v, add(carried.w, scaled(qdd, at.S.w), scaled(qd, turning.w))))
         return found
 
     @cached_property

@@ -40,8 +40,7 @@ class BandMatrix:
     def weighted(cls, parts: Sequence[Self], weights: Array) -> Self:
         """Return the sum of matrices, each times a number for each run, shape (..., matrix)."""
         widest = max(parts, key=lambda part: part.lower.shape[-1]).lower
-        runs = np.broadcast_shapes(weights.shape[:-1], widest.shape[:-2])
-        total = np.zeros((*runs, *widest.shape[-2:]))
+        total = np.zeros((*np.broadcast_shapes(weights.shape[:-1], widest.shape[:-2]), *widest.shape[-2:]))
         for i, part in enumerate(parts):
             total[..., : part.lower.shape[-1]] += part.lower * weights[..., i, None, None]
         return cls(total)
@@ -158,8 +157,7 @@ def _as_band(own: Array, below: Array, r: int) -> Array:
     whole[..., :size], whole[..., :-1, :, size:] = np.swapaxes(own, -1, -2), np.swapaxes(below, -1, -2)
     flat = whole.reshape(*whole.shape[:-2], -1)
     slanted = np.concatenate([flat, np.zeros((*flat.shape[:-1], size))], axis=-1)
-    band: Array = slanted.reshape(*whole.shape[:-3], -1, 2 * size + 1)[..., :r, :size]
-    return band
+    return slanted.reshape(*whole.shape[:-3], -1, 2 * size + 1)[..., :r, :size]
 
 
 def solve_lower(L: Array, right: Array) -> None:

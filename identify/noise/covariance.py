@@ -1,6 +1,6 @@
 """The covariance of rows, of which only those near each other in time are correlated."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Self
@@ -75,17 +75,18 @@ class BandedCovariance:
         products = (early[:, None] * late[:, None]).reshape(lags, -1, length)
         runs, kinds = G.shape[1:-3], G.shape[-3]
         bands = np.zeros((*runs, lags, grid.count, kinds, kinds))
-        for kind, others in _sharing(G):  # all at once would take too much memory
-            pairs = np.einsum("d...st,e...bst->...bdet", G[..., kind, :, :], G[..., others, :, :])
-            found = windowed(pairs.reshape(*pairs.shape[:-3], -1, pairs.shape[-1]), products, before, grid)
-            bands[..., kind, others] = np.moveaxis(found, -3, -1)
+        reached = np.asarray((G != 0).any(axis=(*range(G.ndim - 3), -1)))
+        for kind, own in enumerate(reached):  # all at once would take too much memory
+            if len(others := np.flatnonzero((reached & own).any(axis=-1))):  # with noise of one source in common
+                pairs = np.einsum("d...st,e...bst->...bdet", G[..., kind, :, :], G[..., others, :, :])
+                found = windowed(pairs.reshape(*pairs.shape[:-3], -1, pairs.shape[-1]), products, before, grid)
+                bands[..., kind, others] = np.moveaxis(found, -3, -1)
         return cls(bands * _weights(outside, lags))
 
     @classmethod
     def of_variance(cls, variance: Array, kinds: int) -> Self:
         """Return the covariance of independent rows of that variance, shape (..., r)."""
-        by_kind = variance.reshape(*variance.shape[:-1], 1, -1, kinds)
-        return cls(by_kind[..., None] * np.eye(kinds))
+        return cls(variance.reshape(*variance.shape[:-1], 1, -1, kinds)[..., None] * np.eye(kinds))
 
     def __add__(self, other: Self) -> Self:
         few, many = sorted((self.bands, other.bands), key=lambda bands: bands.shape[-4])
@@ -126,14 +127,6 @@ class BandedCovariance:
             sums = np.matmul(np.swapaxes(_flat(G[..., : count - lag, :, :]), -1, -2), _flat(later))
             total = total + (sums + np.swapaxes(sums, -1, -2) if lag else sums)
         return total
-
-
-def _sharing(G: Array) -> Iterator[tuple[int, npt.NDArray[np.intp]]]:
-    """Yield kinds, and those with which they have noise of one source in common, of signals (..., kind, source, time)."""
-    reached = np.asarray((G != 0).any(axis=(*range(G.ndim - 3), -1)))
-    for kind, own in enumerate(reached):
-        if len(others := np.flatnonzero((reached & own).any(axis=-1))):
-            yield kind, others
 
 
 def _weights(outside: Array, lags: int) -> Array:

@@ -72,8 +72,7 @@ class Linearization:
         slow = smoothed(state.qd, self.signals.fs)
         # Beyond the last sample the motion stays as it is: a place to interpolate to.
         knots = np.minimum(np.arange(0, last + self._every, self._every), last)
-        runs = np.prod(state.q.shape[:-2], dtype=int)
-        each = max(1, MAX_BLOCK // (self.basis.n**2 * OF_A_LINK * max(runs, 1)))
+        each = max(1, MAX_BLOCK // (self.basis.n**2 * OF_A_LINK * max(np.prod(state.q.shape[:-2], dtype=int), 1)))
         pieces = []
         for part in np.split(knots, range(each, len(knots), each)):
             conditions = {name: x[..., part] for name, x in state.conditions.items()}
@@ -98,8 +97,7 @@ def slopes(
     moved = np.concatenate([slides + qd_steps, slides - qd_steps, qd + still, qd + still])
     there = State(turned, moved, lambda _: np.broadcast_to(qdd, turned.shape), conditions or {})
     faster, slower, ahead, behind = np.split(torques(basis, there, X), 4)
-    at_rest = State(q + still, unit + still, lambda x: x, conditions or {})
-    inertia = momenta(basis, at_rest, X)
+    inertia = momenta(basis, State(q + still, unit + still, lambda x: x, conditions or {}), X)
     found = inertia, (faster - slower) / (2 * STEP_QD), (ahead - behind) / (2 * STEP_Q)
     return Slopes(*(np.moveaxis(x, 0, -2) for x in found))
 

@@ -166,14 +166,10 @@ def _thinned(windows: Sequence[Array], rows: RowMap) -> tuple[list[Array], Grid,
 
 def _without_tails(windows: Sequence[Array], first: int) -> list[Array]:
     """Return windows as far as they have energy, and a log goes before its first row: halos are rounded up one by one."""
-    beyond = max(0, (len(windows[0]) - 1) // 2 - first, min(_tail(h) for window in windows for h in (window, window[::-1])))
+    energies = [np.cumsum(h**2) for window in windows for h in (window, window[::-1])]
+    tails = [int(np.searchsorted(energy, TAIL * energy[-1])) for energy in energies]
+    beyond = max(0, (len(windows[0]) - 1) // 2 - first, min(tails))
     return [h[beyond : len(h) - beyond] for h in windows]
-
-
-def _tail(window: Array) -> int:
-    """Number of leading samples of a window with next to no energy."""
-    energy = np.cumsum(window**2)
-    return int(np.searchsorted(energy, TAIL * energy[-1]))
 
 
 def _responses(rows: RowMap) -> tuple[Array, Array, Array]:

@@ -101,8 +101,7 @@ class _Slope:
         every, free = np.concatenate([squares, held], axis=-1), squares.shape[-1]
         roots = [Cholesky.of(BandMatrix.weighted(parts, every)) for parts in units]
         white = [root.whiten(x) for root, x in zip(roots, joined, strict=True)]
-        names = ("",) * (joined[0].shape[-1] - 1)
-        factor = Factor(triangular(np.concatenate(white, axis=-2)), np.array(0), names)
+        factor = Factor(triangular(np.concatenate(white, axis=-2)), np.array(0), ("",) * (joined[0].shape[-1] - 1))
         solvable = factor.determined
         X, inverse = factor.solution(solvable), factor.inverse(solvable)
         found, expected = np.zeros(squares.shape), np.zeros(squares.shape)

@@ -98,8 +98,7 @@ def floor_of(squares: Array, variance: Array, valid: npt.NDArray[np.bool_]) -> A
     of the torque, would count most. a and b, not negative, are fitted with errors in proportion to the variances themselves, to
     squares and variances of shape (..., r), of rows that are valid.
     """
-    count = np.maximum(np.sum(valid, axis=-1, keepdims=True), 1)
-    mean = np.sum(variance * valid, axis=-1, keepdims=True) / count
+    mean = np.sum(variance * valid, axis=-1, keepdims=True) / np.maximum(np.sum(valid, axis=-1, keepdims=True), 1)
     u = np.divide(variance, mean, out=np.ones_like(variance), where=mean > 0)
     a, b = two_levels(u * valid, np.where(valid, 1.0, 0.0), squares * valid)
     share = np.divide(b, a, out=np.full(a.shape, MAX_RATIO), where=a > 0)
@@ -109,8 +108,7 @@ def floor_of(squares: Array, variance: Array, valid: npt.NDArray[np.bool_]) -> A
 def reciprocal_root(variance: Array, floor: Array) -> Array:
     """Return 1 / sqrt(v + floor), shape (..., r), for a floor of shape (...); 1 where that is not known."""
     evened = variance + floor[..., None]
-    known = np.isfinite(evened) & (evened > 0)
-    return 1 / np.sqrt(np.where(known, evened, 1.0))
+    return 1 / np.sqrt(np.where(np.isfinite(evened) & (evened > 0), evened, 1.0))
 
 
 def rectified(x: Array, sigma: Array) -> Array:

@@ -57,15 +57,13 @@ def _repeats_of(log: MotionLog, sigma: Array) -> Array:
     length = scipy.fft.next_fast_len(2 * N, real=True)
     products = scipy.fft.irfft(np.abs(scipy.fft.rfft(q, length)) ** 2, length)[..., lags]
     squares = np.cumsum(q**2, axis=-1)
-    both = squares[..., N - 1 - lags] + squares[..., -1:] - squares[..., lags - 1]
-    D = (both - 2 * products) / (N - lags)
+    D = ((squares[..., N - 1 - lags] + squares[..., -1:] - squares[..., lags - 1]) - 2 * products) / (N - lags)
     usable = sigma**2 > PRECISE * square
     correlation = 1 - D / np.where(usable, 2 * sigma**2, np.inf)[..., None]
     left = np.maximum.accumulate(correlation < 0, axis=-1)  # beyond lags at which the motion has not left its place
     middle = correlation[..., 1:-1]
     peak = (middle > 0) & (middle >= correlation[..., :-2]) & (middle > correlation[..., 2:]) & left[..., 1:-1]
-    added = 2 * np.sum(np.where(peak, middle, 0.0) * (1 - lags[1:-1] / N), axis=-1)
-    return 1 + np.where(usable, added, 0.0)
+    return 1 + np.where(usable, 2 * np.sum(np.where(peak, middle, 0.0) * (1 - lags[1:-1] / N), axis=-1), 0.0)
 
 
 MIN_SAMPLES = 32  # Samples that it takes to estimate noise

@@ -115,11 +115,10 @@ class Bodies:
 
     def room(self, x: Array, step: Array) -> float:
         """Largest multiple of a step from x that stays physically consistent."""
-        least = [float(np.min(step[self._signed] / x[self._signed], initial=0.0))]
         inner = np.linalg.inv(np.linalg.cholesky(pseudo_inertia(x[self._places])))
         changes = inner @ pseudo_inertia(step[self._places]) @ np.swapaxes(inner, 1, 2)
-        least.append(float(np.min(np.linalg.eigvalsh(changes), initial=0.0)))
-        return -1 / min(least) if min(least) < 0 else np.inf
+        shares = np.append(np.linalg.eigvalsh(changes), step[self._signed] / x[self._signed])
+        return -1 / least if (least := float(np.min(shares, initial=0.0))) < 0 else np.inf
 
     def divergence(self, x: Array) -> Divergence | None:
         """Return the distance of x from the given parameters; None where no bodies have them."""

@@ -82,7 +82,9 @@ def consistent_parameters(
     """
     root, given = _root(covariance), _sized(grouping, X, covariance, np.array(given, dtype=np.float64))
     rows, columns = _touched(grouping, X)
-    standard = _as_estimated(grouping, X, given, columns)
+    standard, alone = given.copy(), np.flatnonzero(~columns)  # as estimated what no constraint touches, as given the others
+    which = np.abs(grouping.K[:, alone]).argmax(axis=0)
+    standard[alone] = X[which] / grouping.K[which, alone]
     if rows.any():
         K = grouping.K[np.ix_(rows, columns)]
         own, sigma = _root(covariance[np.ix_(rows, rows)]), np.sqrt(np.diagonal(covariance))[rows]
@@ -90,8 +92,7 @@ def consistent_parameters(
         bodies = Bodies(parameters, given[columns], np.maximum(np.abs(given[columns]), least_change(K, sigma)))
         rest = (X - grouping.base(np.where(columns, 0.0, standard)))[rows]
         A = np.asarray(np.linalg.solve(own, np.column_stack([K, rest])), dtype=np.float64)
-        found = nearest(A[:, :-1], A[:, -1], bodies, weight)
-        standard[columns] = bodies.with_extent(found)
+        standard[columns] = bodies.with_extent(nearest(A[:, :-1], A[:, -1], bodies, weight))
     base, whole = grouping.base(standard), root @ root.T
     off = (base - X)[rows]
     distance = float(np.linalg.norm(np.linalg.solve(_root(whole[np.ix_(rows, rows)]), off))) if rows.any() else 0.0
@@ -101,8 +102,7 @@ def consistent_parameters(
 
 def least_change(K: Array, sigma: Array) -> Array:
     """Return the change of each standard parameter that moves a base value by its sigma, shape (p,); 1 where none does."""
-    size = np.abs(K) / sigma[:, None]
-    most = size.max(axis=0, initial=0.0)
+    most = (np.abs(K) / sigma[:, None]).max(axis=0, initial=0.0)
     return np.where(most > 0, 1 / np.where(most > 0, most, 1.0), 1.0)
 
 
@@ -138,15 +138,6 @@ def _touched(grouping: BaseParameters, X: Array) -> tuple[npt.NDArray[np.bool_],
         if alone and (parameter.kind not in NOT_NEGATIVE or X[i] / grouping.K[i, k] >= 0):
             rows[i], columns[k] = False, False
     return rows, columns
-
-
-def _as_estimated(grouping: BaseParameters, X: Array, given: Array, columns: npt.NDArray[np.bool_]) -> Array:
-    """Return standard parameters: as estimated what no constraint touches, as given the others."""
-    standard = given.copy()
-    for k in np.flatnonzero(~columns):
-        i = int(np.abs(grouping.K[:, k]).argmax())
-        standard[k] = X[i] / grouping.K[i, k]
-    return standard
 
 
 def _root(covariance: Array) -> Array:

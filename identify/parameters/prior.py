@@ -73,8 +73,7 @@ class FilePrior:
         d = bodies.divergence(x)
         assert d is not None
         root = K @ d.root / np.sqrt(weight)
-        of_links = _rows(K @ x - root @ (d.root.T @ d.gradient) * np.sqrt(weight), root @ root.T, own)
-        return np.concatenate([weak, of_links])
+        return np.concatenate([weak, _rows(K @ x - root @ (d.root.T @ d.gradient) * np.sqrt(weight), root @ root.T, own)])
 
     def _with_alike(self, R: Array, weak: Array) -> Array:
         """Return weak rows of which those of offsets know them by the size that they have in common."""

@@ -47,7 +47,8 @@ class Clearance:
         self._model = robot.model
         self._data = mujoco.MjData(robot.model)
         self._fromto, self.least = np.zeros(6), least
-        self.pairs = self._asked()
+        asked, of = combinations(self.shapes, 2), robot.model.geom_bodyid.tolist()
+        self.pairs = np.array([pair for pair in asked if not self._neighbours(*(of[g] for g in pair))], np.intp).reshape(-1, 2)
         random = np.random.default_rng(SEED).uniform(ranges[:, 0], ranges[:, 1], (ALWAYS, robot.n))
         most = self.distances(random, least + ROOM).max(axis=0, initial=-np.inf)
         always = most < least
@@ -69,9 +70,7 @@ class Clearance:
     def bare(self) -> tuple[str, ...]:
         """Names of links that have no shape, and of height fields, whose distances MuJoCo does not tell."""
         m = self._model
-        links = (
-            {int(m.body_weldid[b]) for b in range(1, m.nbody)} - {0} - set(m.body_weldid[m.geom_bodyid[self.shapes]].tolist())
-        )
+        links = set(m.body_weldid[1:].tolist()) - {0} - set(m.body_weldid[m.geom_bodyid[self.shapes]].tolist())
         fields = np.flatnonzero(m.geom_type == int(mujoco.mjtGeom.mjGEOM_HFIELD))
         return (*(body_name(m, link) for link in sorted(links)), *(m.geom(int(g)).name or "a height field" for g in fields))
 
@@ -89,12 +88,6 @@ class Clearance:
             first = m.body_jntadr[body]
             moved[first : first + m.body_jntnum[body], body] = m.body_jntnum[body] > 0
         return moved
-
-    def _asked(self) -> npt.NDArray[np.intp]:
-        """Return the pairs of shapes that joints move against each other, without those of neighbouring links."""
-        m = self._model
-        pairs = [pair for pair in combinations(self.shapes, 2) if not self._neighbours(*(int(m.geom_bodyid[g]) for g in pair))]
-        return np.array(pairs, dtype=np.intp).reshape(-1, 2)
 
     def _neighbours(self, one: int, two: int) -> bool:
         """True if two bodies belong to one link, or to two with a joint between them; what stands around is nobody's."""
@@ -129,10 +122,7 @@ class Clearance:
         for k, posture in enumerate(q):
             d.qpos[:] = posture
             mujoco.mj_kinematics(m, d)
-            pos[k] = d.geom_xpos
-            mat[k] = d.geom_xmat
-            axis[k] = d.xaxis
-            anchor[k] = d.xanchor
+            pos[k], mat[k], axis[k], anchor[k] = d.geom_xpos, d.geom_xmat, d.xaxis, d.xanchor
         return pos, mat, axis, anchor
 
     def _gaps(self, pos: Array, mat: Array) -> Array:
@@ -167,8 +157,7 @@ class Clearance:
         The sum of (1 - distance / margin)^2 over instants and pairs that are nearer than a margin beyond the least distance.
         """
         pos, mat, axis, anchor = self._centres(q)
-        total = 0.0
-        slope = np.zeros_like(q)
+        total, slope = 0.0, np.zeros_like(q)
         near = self._gaps(pos, mat) < self._margin
         hinge = ~self._robot.slides
         for k in np.flatnonzero(near.any(axis=1)):

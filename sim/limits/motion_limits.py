@@ -92,8 +92,7 @@ class MotionLimits:
         content = read_toml(path, "limits")
         if isinstance(content.get("keep_out"), dict):
             raise ScenarioError(f"limits {path}: write [[keep_out]], with double brackets, for each box")
-        found: MotionLimits = make(cls, content, "")
-        return found
+        return make(cls, content, "")
 
 
 def limits_of(robot: Robot, asked: MotionLimits) -> Limits:
@@ -156,10 +155,9 @@ def looser(robot: Robot, asked: MotionLimits) -> list[str]:
     ]
     for name, own in known.items():
         if (values := getattr(asked, name)) is not None:
-            given = per_joint(values, robot.n, f"limits: {name}")
             found += [
                 f"{name} of {joint} may be {x:g}, its file says {most:g}"
-                for joint, x, most in zip(robot.joints, given, own, strict=True)
+                for joint, x, most in zip(robot.joints, per_joint(values, robot.n, f"limits: {name}"), own, strict=True)
                 if x > most
             ]
     return found

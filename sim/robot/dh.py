@@ -57,8 +57,7 @@ def _described(path: Path, stated: Mapping[str, Any]) -> tuple[mujoco.MjSpec, li
     convention = stated.get("convention", KHALIL)
     if convention not in (KHALIL, CLASSIC):
         raise RobotError(f"{path}: convention = {convention!r} is none of {KHALIL}, {CLASSIC}")
-    scale = {"rad": 1.0, "deg": np.pi / 180}.get(str(stated.get("angles", "")))
-    if scale is None:
+    if (scale := {"rad": 1.0, "deg": np.pi / 180}.get(str(stated.get("angles", "")))) is None:
         raise RobotError(f'{path}: say angles = "rad" or angles = "deg"')
     spec, bodies = mujoco.MjSpec(), dict[str, mujoco.MjsBody]()
     spec.compiler.degree = False
@@ -101,10 +100,8 @@ class _Values:
     @property
     def slides(self) -> bool:
         if (sigma := self._joint.get("sigma", 0)) not in (0, 1) or isinstance(sigma, bool):
-            raise RobotError(
-                f"{self._path}: joint {self._name}: sigma = {self._joint['sigma']!r} must be 0 (turns) or 1 (slides)"
-            )
-        return bool(self._joint.get("sigma", 0))
+            raise RobotError(f"{self._path}: joint {self._name}: sigma = {sigma!r} must be 0 (turns) or 1 (slides)")
+        return bool(sigma)
 
     @property
     def range(self) -> list[float] | None:
@@ -134,8 +131,7 @@ class _Values:
 
 
 def _parent(path: Path, joint: Mapping[str, Any], bodies: Mapping[str, mujoco.MjsBody], last: mujoco.MjsBody) -> mujoco.MjsBody:
-    name = joint.get("parent")
-    if name is None:
+    if (name := joint.get("parent")) is None:
         return last
     if name not in bodies:
         raise RobotError(f"{path}: parent {name!r} is no joint before it; known: {', '.join(bodies) or 'none'}")
@@ -171,8 +167,7 @@ def _numbers(path: Path, where: str, stated: object, count: int, most: float) ->
 
 
 def _turn(axis: str, angle: float) -> Array:
-    c, s = np.cos(angle), np.sin(angle)
-    c, s = (np.round(x) if abs(x - np.round(x)) < 1e-15 else x for x in (c, s))
+    c, s = (np.round(x) if abs(x - np.round(x)) < 1e-15 else x for x in (np.cos(angle), np.sin(angle)))
     if axis == "x":
         return np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
     return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])

@@ -203,16 +203,12 @@ def coupled(texts: Sequence[str]) -> tuple[tuple[str, tuple[tuple[str, float], .
     for text in texts:
         name, _, terms = text.partition("=")
         parts = TERM.findall(terms)
-        if (
-            not re.fullmatch(r"[A-Za-z]\w*", name)
-            or not parts
-            or "".join("".join(part) for part in parts) != terms.replace(" ", "")
-        ):
+        read = "".join("".join(part) for part in parts)
+        if not re.fullmatch(r"[A-Za-z]\w*", name) or not parts or read != terms.replace(" ", ""):
             raise RobotError(
                 f"--coupling {text}: give a name and what its motor turns with, such as motor6=joint_5+joint_6 or m=a-0.5*b"
             )
-        weights = ((joint, float(f"{sign}{factor.rstrip('*') or '1'}")) for sign, factor, joint in parts)
-        found.append((name, tuple(weights)))
+        found.append((name, tuple((joint, float(f"{sign}{factor.rstrip('*') or '1'}")) for sign, factor, joint in parts)))
     return tuple(found)
 
 

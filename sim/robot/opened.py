@@ -9,8 +9,7 @@ from idbench.sim.robot.mounting import forget
 
 def hold_bases(spec: mujoco.MjSpec) -> Iterator[str]:
     """Hold bodies that float where the file has them; yield a note."""
-    floating = [joint for joint in spec.joints if joint.type == mujoco.mjtJoint.mjJNT_FREE]
-    if not floating:
+    if not (floating := [joint for joint in spec.joints if joint.type == mujoco.mjtJoint.mjJNT_FREE]):
         return
     bodies = ", ".join(joint.parent.name or joint.name for joint in floating)
     forget(spec, {joint.name for joint in floating}, [joint.name for joint in spec.joints])

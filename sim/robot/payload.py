@@ -75,8 +75,7 @@ class Payload:
             if self.inertia:
                 raise ScenarioError(f"payload.inertia = {self.inertia:g} kg m^2 needs a payload.mass above 0")
             return
-        link = spec.joints[-1].parent
-        body = link.add_body(name="payload", pos=list(self.position))
+        body = spec.joints[-1].parent.add_body(name="payload", pos=list(self.position))
         body.mass = self.mass
         radius = (3 * self.mass / (4 * pi * 7850)) ** (1 / 3)  # of a ball of 7850 kg/m^3, whose inertia is 2/5 m r^2
         body.inertia = [self.inertia or 0.4 * self.mass * radius**2] * 3

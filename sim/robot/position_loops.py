@@ -40,12 +40,8 @@ def position_loops(robot: Robot) -> dict[str, PositionLoop]:
     for k in range(model.nu):
         if model.actuator_trntype[k] == int(mujoco.mjtTrn.mjTRN_JOINT):
             joint = int(model.actuator_trnid[k, 0])
-            made = (
-                _dcmotor(model, k)
-                if model.actuator_gaintype[k] == int(mujoco.mjtGain.mjGAIN_DCMOTOR)
-                else _affine(model, k, joint)
-            )
-            if made is not None:
+            is_dc = model.actuator_gaintype[k] == int(mujoco.mjtGain.mjGAIN_DCMOTOR)
+            if (made := _dcmotor(model, k) if is_dc else _affine(model, k, joint)) is not None:
                 found[model.joint(joint).name] = made
     return found
 

@@ -129,8 +129,7 @@ def _around(name: str, text: str) -> str:
     """Return a text with what stands before and after the element of the robot in its file: licences, as a rule."""
     raw = Robot.path(name).read_bytes()
     parser = expat.ParserCreate()
-    starts = list[int]()
-    ends = [0]
+    starts, ends = list[int](), [0]
     parser.StartElementHandler = lambda *_: starts.append(parser.CurrentByteIndex)
     parser.EndElementHandler = lambda *_: ends.append(parser.CurrentByteIndex)
     parser.Parse(raw, True)
@@ -143,15 +142,14 @@ def _relocate(root: ElementTree.Element, old: Path, new: Path) -> None:
     assets = [asset for assets in root.iter("asset") for asset in assets if any(key.startswith("file") for key in asset.attrib)]
     if not assets or old == new:
         return
-    compilers = root.findall("compiler")
+    if not (compilers := root.findall("compiler")):
+        compilers = [ElementTree.Element("compiler")]
+        root.insert(0, compilers[0])
     settings: dict[str, str] = {}
     for compiler in compilers:  # the last that says it holds
         settings |= {key: compiler.attrib.pop(key) for key in ("assetdir", "meshdir", "texturedir") if key in compiler.attrib}
-    first = compilers[0] if compilers else ElementTree.Element("compiler")
-    if not compilers:
-        root.insert(0, first)
     for attribute in ("meshdir", "texturedir"):
-        first.set(attribute, os.path.relpath(old / settings.get(attribute, settings.get("assetdir", "")), new))
+        compilers[0].set(attribute, os.path.relpath(old / settings.get(attribute, settings.get("assetdir", "")), new))
 
 
 def _document(name: str, mounting: Mounting) -> ElementTree.Element:

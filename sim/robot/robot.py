@@ -43,18 +43,15 @@ class Robot:
     """What was mended in its file to compile it."""
 
     def __post_init__(self) -> None:
-        simple = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
-        other = [self.model.joint(j) for j in range(self.model.njnt) if self.model.jnt_type[j] not in simple]
-        if other:
-            called = ", ".join(
-                f"{joint.name!r} of body {self.model.body(self.model.jnt_bodyid[joint.id]).name!r}" for joint in other
-            )
+        model, simple = self.model, (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
+        if other := [model.joint(j) for j in range(model.njnt) if model.jnt_type[j] not in simple]:
+            called = ", ".join(f"{joint.name!r} of body {model.body(model.jnt_bodyid[joint.id]).name!r}" for joint in other)
             hold = " ".join(shlex.quote(f"{joint.name}=0") for joint in other)
             raise RobotError(
                 f"robot {self.name!r}: a joint must turn about or slide along one axis, which {called} does not (its body "
                 f"turns freely): --lock {hold} holds it where the file has it"
             )
-        if not self.model.njnt:
+        if not model.njnt:
             raise RobotError(f"robot {self.name!r} has no joints")
 
     @classmethod
@@ -212,9 +209,8 @@ class Robot:
                 limits[joint] = min(limits[joint], gear * _smaller_side(model.actuator_forcerange[a]))
             is_force = model.actuator_biastype[a] == int(mujoco.mjtBias.mjBIAS_NONE)
             if model.actuator_ctrllimited[a] and is_force:
-                limits[joint] = min(
-                    limits[joint], gear * model.actuator_gainprm[a, 0] * _smaller_side(model.actuator_ctrlrange[a])
-                )
+                scale = gear * model.actuator_gainprm[a, 0]
+                limits[joint] = min(limits[joint], scale * _smaller_side(model.actuator_ctrlrange[a]))
         return limits
 
 

@@ -52,9 +52,7 @@ def scara_truth(robot: Robot) -> dict[str, float]:
 
 def _about_joint(model: mujoco.MjModel, data: mujoco.MjData, joint: int, x_axis: Array) -> tuple[float, float, Array]:
     """Return moment of inertia about a joint's axis, mass, and first moments along and across `x_axis`, of its link."""
-    zz = 0.0
-    mass = 0.0
-    first = np.zeros(2)
+    zz, mass, first = 0.0, 0.0, np.zeros(2)
     across = np.cross([0.0, 0.0, 1.0], x_axis)
     for body in range(model.nbody):
         if model.body_weldid[body] != model.jnt_bodyid[joint]:

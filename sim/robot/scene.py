@@ -61,7 +61,8 @@ def shapes(robot: Robot) -> list[SceneShape]:
     for g in range(model.ngeom):
         kind = _KINDS.get(int(model.geom_type[g]))
         geom = model.geom(g)
-        rgba = _color(model, g)
+        material = int(model.geom_matid[g])
+        rgba = (model.geom_rgba[g] if material < 0 else model.mat_rgba[material]).astype(np.float64)
         if kind is None or rgba[3] == 0 or model.geom_group[g] >= HIDDEN:
             continue
         body = body_name(model, int(model.geom_bodyid[g]))
@@ -74,11 +75,6 @@ def shapes(robot: Robot) -> list[SceneShape]:
 def body_name(model: mujoco.MjModel, b: int) -> str:
     """Return the name of a body, or its number where it has none."""
     return model.body(b).name or f"body{b}"
-
-
-def _color(model: mujoco.MjModel, g: int) -> Array:
-    material = int(model.geom_matid[g])
-    return (model.geom_rgba[g] if material < 0 else model.mat_rgba[material]).astype(np.float64)
 
 
 def _mesh(model: mujoco.MjModel, m: int) -> tuple[Array, npt.NDArray[np.int32]]:

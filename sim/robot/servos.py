@@ -23,7 +23,6 @@ STEP = 5e-4
 EARLY = 1.3
 """Steps by which a command acts early: force acts from half a step before, the rate limit moves on before that. Measured."""
 
-
 NO_DRIVE = ("armature", "damping", "frictionloss", "stiffness", "margin", "ref", "springref")
 """What a joint that is free play has none of, whatever the defaults of the file are."""
 
@@ -145,13 +144,13 @@ def _dcmotor(servo: ServoValues) -> dict[str, str]:
     kp, most = servo.gain * servo.supply * servo.a, servo.duty_limit * servo.supply
     kd = servo.b + servo.kd * servo.supply * servo.a
     samples = round(servo.delay / STEP + EARLY)
-    late = {"nsample": str(samples), "delay": repr(samples * STEP)}
     return {
         "motorconst": repr(K),
         "resistance": repr(K / servo.a),
         "input": "pos",
         "controller": " ".join(repr(float(x)) for x in (kp, 0.0, kd, rate, 0.0, most)),
-        **late,
+        "nsample": str(samples),
+        "delay": repr(samples * STEP),
     }
 
 

@@ -59,8 +59,7 @@ def kinematic_tree(robot: Robot, couplings: Sequence[str] = ()) -> KinematicTree
             )
             parent = k
         last[body] = parent
-    weightless = model.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_GRAVITY)
-    gravity = np.zeros(3) if weightless else model.opt.gravity
+    gravity = np.zeros(3) if model.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_GRAVITY) else model.opt.gravity
     return KinematicTree(robot.name, tuple(joints), gravity, tuple(_couplings(robot, couplings)))
 
 
@@ -119,11 +118,8 @@ def _require_open(robot: Robot) -> None:
     """Raise RobotError if something other than the tree ties joints together."""
     model = robot.model
     ties = [_tie(model, i) for i in range(model.neq) if model.eq_active0[i]]
-    ties += [
-        f"tendon {model.tendon(i).name!r}"
-        for i in range(model.ntendon)
-        if i not in fixed_tendons(model) and _is_stiff(model, i)
-    ]
+    spatial = [i for i in range(model.ntendon) if i not in fixed_tendons(model)]
+    ties += [f"tendon {model.tendon(i).name!r}" for i in spatial if _is_stiff(model, i)]
     if ties:
         raise RobotError(
             f"robot {robot.name!r} is no open tree: {', '.join(ties)} closes a chain or couples joints; hold the "
@@ -134,11 +130,9 @@ def _require_open(robot: Robot) -> None:
 def _tie(model: mujoco.MjModel, equality: int) -> str:
     """Return kind and name of an equality constraint, and what it ties."""
     kind = mujoco.mjtEq(model.eq_type[equality]).name.removeprefix("mjEQ_").lower()
-    one = int(model.eq_obj1id[equality])
-    two = int(model.eq_obj2id[equality])
-    name = model.equality(equality).name
+    ends, name = (int(model.eq_obj1id[equality]), int(model.eq_obj2id[equality])), model.equality(equality).name
     of = model.joint if kind == "joint" else model.body if model.eq_objtype[equality] == mujoco.mjtObj.mjOBJ_BODY else None
-    tied = f" ({' and '.join(of(i).name for i in (one, two) if i >= 0)})" if of else ""
+    tied = f" ({' and '.join(of(i).name for i in ends if i >= 0)})" if of else ""
     return f"{kind} {name!r}{tied}" if name else f"{kind}{tied}"
 
 
@@ -174,9 +168,7 @@ def _placement(model: mujoco.MjModel, body: int) -> tuple[int, Array, Array]:
 
 def _inertial(model: mujoco.MjModel, link: int) -> tuple[Array, Array, float]:
     """Return inertia matrix and first moments about the origin of a link's frame, and its mass."""
-    inertia = np.zeros((3, 3))
-    first = np.zeros(3)
-    mass = 0.0
+    inertia, first, mass = np.zeros((3, 3)), np.zeros(3), 0.0
     for body, position, rotation in _welded(model, link):
         m, c = float(model.body_mass[body]), position + rotation @ model.body_ipos[body]
         axes = rotation @ _rotation(model.body_iquat[body])

@@ -102,8 +102,7 @@ def _written(root: ElementTree.Element, lines: Lines) -> str:
     written, names = list[str](), list[str]()
     at, open_ = 1, [iter((root,))]
     while open_:
-        element = next(open_[-1], None)
-        if element is None:
+        if (element := next(open_[-1], None)) is None:
             open_.pop()
             written += [f"</{names.pop()}>"] if names else []
             continue

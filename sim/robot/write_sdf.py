@@ -36,8 +36,7 @@ def sdf_text(robot: Robot, tree: KinematicTree, standard: Mapping[str, float]) -
 
 def _link(model: ElementTree.Element, link: PlacedLink) -> None:
     element = ElementTree.SubElement(model, "link", {"name": link.name})
-    pose = _text(element, "pose", numbers(np.concatenate([link.place, link.angles])))
-    pose.set("relative_to", link.parent)
+    _text(element, "pose", numbers(np.concatenate([link.place, link.angles]))).set("relative_to", link.parent)
     body = link.body if link.body is not None and link.body.mass > 0 else BALL
     inertial = ElementTree.SubElement(element, "inertial")
     _text(inertial, "pose", numbers(np.concatenate([body.centre, np.zeros(3)])))
@@ -48,9 +47,8 @@ def _link(model: ElementTree.Element, link: PlacedLink) -> None:
 
 
 def _joint(model: ElementTree.Element, link: PlacedLink) -> None:
-    joint = ElementTree.SubElement(
-        model, "joint", {"name": link.joint.name, "type": "prismatic" if link.joint.kind == "slide" else "revolute"}
-    )
+    kind = "prismatic" if link.joint.kind == "slide" else "revolute"
+    joint = ElementTree.SubElement(model, "joint", {"name": link.joint.name, "type": kind})
     _text(joint, "parent", link.parent)
     _text(joint, "child", link.name)
     axis = ElementTree.SubElement(joint, "axis")

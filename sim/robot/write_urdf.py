@@ -21,8 +21,7 @@ def urdf_text(name: str, robot: Robot, tree: KinematicTree, standard: Mapping[st
     moves, what is welded to it has none. Other robots become links and joints without shapes. Inertias of rotors stand in
     transmissions, where Drake and idbench read them.
     """
-    path = Robot.path(name)
-    text = path.read_text(encoding="utf-8")
+    text = Robot.path(name).read_text(encoding="utf-8")
     if mounting.plain and "<robot" in text:
         root, _ = parsed(text, comments=True)
         _rewrite(root, tree, standard)
@@ -79,8 +78,7 @@ def _bounded(link: PlacedLink) -> bool:
 
 
 def _transmission(root: ElementTree.Element, joint: str) -> ElementTree.Element | None:
-    own = (x for x in root.findall("transmission") for of in x.findall("joint") if of.get("name") == joint)
-    return next(own, None)
+    return next((x for x in root.findall("transmission") for of in x.findall("joint") if of.get("name") == joint), None)
 
 
 def _has_rotor(root: ElementTree.Element, joint: str) -> bool:
@@ -91,13 +89,11 @@ def _has_rotor(root: ElementTree.Element, joint: str) -> bool:
 def _drive(root: ElementTree.Element, joint: str, rotor: float) -> None:
     """Give a joint a motor with a rotor, as seen at the joint; in the transmission that it has, if it has one."""
     root.set("xmlns:drake", DRAKE)
-    transmission = _transmission(root, joint)
-    if transmission is None:
+    if (transmission := _transmission(root, joint)) is None:
         transmission = ElementTree.SubElement(root, "transmission", {"name": f"{joint}_transmission"})
         ElementTree.SubElement(transmission, "type").text = "transmission_interface/SimpleTransmission"
         ElementTree.SubElement(transmission, "joint", {"name": joint})
-    actuator = transmission.find("actuator")
-    if actuator is None:
+    if (actuator := transmission.find("actuator")) is None:
         actuator = ElementTree.SubElement(transmission, "actuator", {"name": f"{joint}_motor"})
     for tag, value in ((ROTOR_INERTIA, rotor), (GEAR_RATIO, 1.0)):
         found = next((x for x in actuator if x.tag == tag), None)  # to find() a prefix is one that is declared

@@ -94,6 +94,5 @@ def _fading(t: Array, end: float, fade: float) -> tuple[Array, Array, Array]:
     if fade == 0:
         one = np.ones((len(t), 1))
         return one, 0 * one, 0 * one
-    there_and_back = at_rest(np.array([[0.0], [1.0], [1.0], [0.0]]), np.array([fade, end - 2 * fade, fade]), 0.0)
-    found = there_and_back.at(t, 1.0)
+    found = at_rest(np.array([[0.0], [1.0], [1.0], [0.0]]), np.array([fade, end - 2 * fade, fade]), 0.0).at(t, 1.0)
     return found.q, found.qd, found.qdd

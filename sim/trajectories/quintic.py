@@ -43,8 +43,6 @@ class Quintic(AbstractTrajectory):
 
 
 DRAWS = 10000  # Draws of all joints, and then of single ones, after which no waypoint is believed to exist
-
-
 BLOCK = 50  # Draws that are looked at together
 
 
@@ -77,8 +75,7 @@ def draw_waypoint(
     if (low < high).all() and np.isfinite(ranges).all():
         for _ in range(DRAWS // BLOCK):
             before = rng.bit_generator.state
-            points = rng.uniform(low, high, (BLOCK, len(ranges)))
-            right = _far(points, neighbours, smallest_move).all(axis=-1)
+            right = _far(rng.uniform(low, high, (BLOCK, len(ranges))), neighbours, smallest_move).all(axis=-1)
             if right.any():
                 rng.bit_generator.state = before  # which has drawn no more than it took
                 return np.asarray(rng.uniform(low, high, (int(right.argmax()) + 1, len(ranges)))[-1])
@@ -95,6 +92,16 @@ def draw_waypoint(
         f"{len(ranges)} joints, the narrowest {ranges[narrow, 0]:.4g} to {ranges[narrow, 1]:.4g}: lower smallest_move or "
         "clearance"
     )
+
+
+def draw_waypoints(
+    rng: np.random.Generator, count: int, ranges: Array, clearance: Array | float, smallest_move: Array | float
+) -> Array:
+    """Return as many random waypoints, one after the other [rad], shape (waypoint, joint); all else as of `draw_waypoint`."""
+    points = np.zeros((count, len(ranges)))
+    for k in range(count):
+        points[k] = draw_waypoint(rng, ranges, points[max(k - 1, 0) : k], clearance, smallest_move)
+    return points
 
 
 @settings
@@ -122,18 +129,14 @@ class RandomMoves(AbstractTrajectory):
 
     def plan(self, robot: Robot) -> PointToPoint:
         """Draw waypoints and times; every joint moves in every move."""
-        rng, points = np.random.default_rng(self.seed), np.zeros((self.moves + 1, robot.n))
-        ranges = room(robot)
+        rng, ranges = np.random.default_rng(self.seed), room(robot)
         width = np.diff(ranges, axis=1)[:, 0]
         clearance = np.minimum(0.2, width / 10) if self.clearance is None else self.clearance
         smallest = np.minimum(0.4, width / 4) if self.smallest_move is None else self.smallest_move
-        for k in range(self.moves + 1):
-            neighbours = points[max(k - 1, 0) : k]
-            points[k] = draw_waypoint(rng, ranges, neighbours, clearance, smallest)
+        points = draw_waypoints(rng, self.moves + 1, ranges, clearance, smallest)
         velocity = per_joint(self.velocity, robot.n, "trajectory.velocity")
         fastest = (PEAK_VELOCITY * np.abs(np.diff(points, axis=0)) / velocity).max(axis=1)
-        times = np.maximum(rng.uniform(*self.durations, self.moves), fastest)
-        return at_rest(points, times, self.rest)
+        return at_rest(points, np.maximum(rng.uniform(*self.durations, self.moves), fastest), self.rest)
 
 
 @settings
@@ -178,9 +181,7 @@ class RandomPace(AbstractTrajectory):
         middle, half = ranges.mean(axis=1), np.diff(ranges, axis=1)[:, 0] / 2 - self.clearance
         reach = half * rng.uniform(0.2, 1.0, robot.n)
         around = np.stack([middle - reach, middle + reach], axis=1) + (rng.uniform(-1, 1, robot.n) * (half - reach))[:, None]
-        points = np.zeros((count + 1, robot.n))
-        for k in range(count + 1):
-            points[k] = draw_waypoint(rng, around, points[max(k - 1, 0) : k], 0.0, self.smallest_move)
+        points = draw_waypoints(rng, count + 1, around, 0.0, self.smallest_move)
         found = at_rest(points, self.shortest + np.diff(edges) * self.period, self.rest)
         if (fastest := float(found.peak_velocity.max())) > self.velocity:
             raise ScenarioError(f"seed {self.seed} draws a motion of {fastest:.3g} rad/s, above velocity = {self.velocity:g}")
@@ -189,6 +190,5 @@ class RandomPace(AbstractTrajectory):
 
 def room(robot: Robot) -> Array:
     """Ranges of random motion, shape (joint, 2): their ranges, or half a turn or metre to either side."""
-    free = np.where(robot.slides, 0.5, np.pi)
-    around = robot.model.qpos0[:, None] + free[:, None] * [-1.0, 1.0]
+    around = robot.model.qpos0[:, None] + np.where(robot.slides, 0.5, np.pi)[:, None] * [-1.0, 1.0]
     return np.where(np.isfinite(robot.ranges), robot.ranges, around)

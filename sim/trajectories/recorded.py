@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 import scipy
@@ -50,13 +50,10 @@ class RecordedMotion(AbstractMotion):
     @cached_property
     def _curves(self) -> "tuple[scipy.interpolate.BSpline, ...]":
         still = np.zeros(self.q.shape[1])
-        ends = [[(1, still), (2, still)] if share.max() < RESTS else [(3, still), (4, still)] for share in self.moving]
-        spline = scipy.interpolate.make_interp_spline(
-            self.t,
-            self.q,
-            k=DEGREE,
-            bc_type=tuple(ends),  # type: ignore[arg-type]  # the stubs know conditions by their names alone
+        ends: Any = tuple(  # the stubs know conditions by their names alone
+            [(1, still), (2, still)] if share.max() < RESTS else [(3, still), (4, still)] for share in self.moving
         )
+        spline = scipy.interpolate.make_interp_spline(self.t, self.q, k=DEGREE, bc_type=ends)
         return spline, spline.derivative(1), spline.derivative(2)
 
 

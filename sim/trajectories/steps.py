@@ -51,8 +51,7 @@ class RandomSteps(AbstractTrajectory):
         points = np.tile(middle, (self.steps + 1, 1))
         for k in range(1, self.steps + 1):
             drawn = draw_waypoint(rng, used, points[k - 1 : k], 0.0, self.smallest_step * width)
-            moving = self.together or np.arange(robot.n) == (k - 1) % robot.n
-            points[k] = np.where(moving, drawn, points[k - 1])
+            points[k] = np.where(self.together or np.arange(robot.n) == (k - 1) % robot.n, drawn, points[k - 1])
         times = rng.uniform(*self.holds, self.steps)
         times *= np.mean(self.holds) / times.mean()  # so that all motions of a study are equally long
         moves = rng.random(self.steps) < self.moves
@@ -76,6 +75,5 @@ class _Steps(AbstractMotion):
         planned, start = whole.at(t, fs), whole.dwells[:-1].cumsum() + np.append(0.0, whole.durations[:-1].cumsum())
         k = np.searchsorted(start, t + 1e-9, side="right") - 1
         jumps = (k >= 0) & ~self.moves[np.maximum(k, 0)]
-        ends = whole.waypoints[np.maximum(k, 0) + 1]
-        q = np.where(jumps[:, None], ends, planned.q)
+        q = np.where(jumps[:, None], whole.waypoints[np.maximum(k, 0) + 1], planned.q)
         return Reference(fs, q, *(np.where(jumps[:, None], 0.0, x) for x in (planned.qd, planned.qdd)))

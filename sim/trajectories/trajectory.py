@@ -41,8 +41,7 @@ class AbstractMotion(ABC):
     @final
     def sample(self, fs: float) -> Reference:
         """Return the motion at t = 0, 1/fs, 2/fs, ... below its duration, exactly."""
-        count = round(self.duration * fs)
-        return self.at(np.arange(count) / fs, fs)
+        return self.at(np.arange(round(self.duration * fs)) / fs, fs)
 
 
 MOST_SAMPLES = 1e8  # Samples of a joint above which a motion is taken for a slip: 0.8 GB
@@ -76,8 +75,7 @@ class AbstractTrajectory(ABC):
         """
         planned = self.motion(robot)
         # Extremes of smooth moves between waypoints lie at waypoints or a little beyond; 50 Hz finds them to 0.1 %.
-        probe = np.linspace(0.0, planned.duration, 2 + int(50 * planned.duration))
-        require_in_range(robot, planned.at(probe, 50.0).q)
+        require_in_range(robot, planned.at(np.linspace(0.0, planned.duration, 2 + int(50 * planned.duration)), 50.0).q)
         if not 1 <= planned.duration * fs <= MOST_SAMPLES:
             raise ScenarioError(
                 f"fs = {fs:g} Hz makes {planned.duration * fs:.3g} samples of this motion; 1 to {MOST_SAMPLES:.0e} are allowed"

@@ -115,8 +115,7 @@ class Cogging(AbstractJointLaw):
 
     def torques(self, state: State) -> Mapping[str, Array]:
         """Return sine and cosine."""
-        waves = np.sin(self.periods * state.q), np.cos(self.periods * state.q)
-        return dict(zip(self.letters(), waves, strict=True))
+        return dict(zip(self.letters(), (np.sin(self.periods * state.q), np.cos(self.periods * state.q)), strict=True))
 
 
 @dataclass(frozen=True)

@@ -67,8 +67,7 @@ class ShapedFriction(AbstractJointLaw):
         for shape in self.shapes:
             b = self.at_joints(n)
             ahead, behind = ({**b, shape.setting: b[shape.setting] * np.exp(h)} for h in (STEP, -STEP))
-            slope = (force(ahead) - force(behind)) / (2 * STEP * b[shape.setting][..., None])
-            found[shape.letters] = size * slope
+            found[shape.letters] = size * ((force(ahead) - force(behind)) / (2 * STEP * b[shape.setting][..., None]))
         return found
 
     def operating_point(self, n: int) -> Mapping[Parameter, Array | float]:
@@ -105,8 +104,7 @@ class ShapedFriction(AbstractJointLaw):
 def with_settings(law: AbstractFriction, settings: Mapping[str, Any]) -> AbstractFriction:
     """Return a law with other settings."""
     made: Any = law
-    found: AbstractFriction = replace(made, **settings)
-    return found
+    return replace(made, **settings)
 
 
 def _joints(n: int, X: Array, letters: str, known: Mapping[Parameter, Array | None], default: Array | float) -> Array:
