@@ -13,17 +13,9 @@ from idbench.experiments.identification.request import Request
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.identification.stated import contradicted
 from idbench.experiments.results.writing import finite, summarize
-from idbench.identify import (
-    Array,
-    Basis,
-    Chain,
-    Estimate,
-    IdentificationError,
-    Problem,
-    encoder_steps,
-)
+from idbench.identify import Array, Basis, Chain, Estimate, IdentificationError, Problem, encoder_steps
 from idbench.identify.arrays import TINY
-from idbench.identify.judge.diagnosis import diagnosed
+from idbench.identify.judge.diagnosis import diagnosed, dropped_samples
 from idbench.identify.judge.friction_choice import FrictionChoice
 from idbench.identify.judge.motion_share import MotionShare, motion_shares, something_else
 from idbench.identify.judge.suspect import Suspect
@@ -72,7 +64,12 @@ class Fit:
 
     @cached_property
     def diagnosis(self) -> tuple[Cause, ...] | None:
-        """What is wrong, as residuals show it; None where the rows do not allow the tests."""
+        """What is wrong, as residuals show it; None where the rows do not allow the tests.
+
+        All else may be the doing of samples that were dropped.
+        """
+        if dropped := dropped_samples(self.logs.fitted):
+            return causes_of((dropped,), self.robot_model, self.logs.fitted[0])
         try:
             suspects = diagnosed(self.problem, self.estimates[self.leading].X)
             unknown = () if suspects else tuple(something_else(self.motion_shares))
@@ -233,7 +230,7 @@ class Fit:
         for name, interval in self.torque_intervals.items():
             models[name]["torque_interval"] = None if interval is None else [finite(x) for x in interval.half]
             models[name]["torque_interval_band"] = None if interval is None else interval.band
-        delay, cutoff = self.delay, getattr(self.processing.operator, "cutoff", None)
+        delay, cutoff = self.delay, self.processing.cutoff
         return {
             "parameters": list(self.basis.names),
             "units": list(self.basis.units),

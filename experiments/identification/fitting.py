@@ -12,15 +12,7 @@ from idbench.experiments.identification.logs import Logs
 from idbench.experiments.identification.prior_share import chosen_share
 from idbench.experiments.identification.request import Request
 from idbench.experiments.identification.smooth_friction import places_of, sizes_of
-from idbench.identify import (
-    ESTIMATORS,
-    MODELS,
-    ExcitationError,
-    IdentificationError,
-    MotionLog,
-    Problem,
-    attempt_each,
-)
+from idbench.identify import ESTIMATORS, MODELS, ExcitationError, IdentificationError, MotionLog, Problem, attempt_each
 from idbench.identify.arrays import TINY
 from idbench.identify.data.motion_log import never_logged
 from idbench.identify.judge.diagnosis import diagnosed, silent_joint, still_joints, unlogged, unrelated_joint

@@ -75,14 +75,13 @@ def chosen_friction(request: Request, logs: tuple[MotionLog, ...], most: int | N
 
 def _ripples(problem: Problem) -> dict[str, OfJoints]:
     """Cogging of the waves that residuals of each hinge have most of."""
-    cutoff = getattr(problem.own_chain.operator, "cutoff", None)
+    cutoff = problem.own_chain.cutoff
     if cutoff is None or problem.long or problem.logs[0].poses:
         return {}
     e = problem.rows.Y - problem.rows.predicted(problem.factors.fit(2).X)
     joints = defaultdict[str, list[int]](list)
-    hinges = [j for j in range(problem.basis.n) if j not in problem.basis.slides]
     sizes = [np.ones(part.signals.state.q.shape) for part in problem.parts]
-    for j, k in likely_waves(problem.parts, e, sizes, cutoff, hinges, apart=0):
+    for j, k in likely_waves(problem.parts, e, sizes, cutoff, problem.basis.hinges, apart=0):
         joints[f"cogging:{k}"].append(j)
     return {name: OfJoints(law_of(name), tuple(own)) for name, own in joints.items()}
 

@@ -10,6 +10,7 @@ from idbench.identify import Array, Joint, KinematicTree, MotionLog, Problem
 from idbench.identify.basis.block import FRICTION, RIGID, Kind
 from idbench.identify.data.jumps import Jump, jumps
 from idbench.identify.data.kinematics import GROUND
+from idbench.identify.judge.diagnosis import DROPOUTS
 
 FAR_OFF = 30.0  # Factor between measured and expected torques that no missing rotor makes in the joint that carries most
 
@@ -72,7 +73,6 @@ MOST_TURNS = 2.0
 
 HARDLY = 0.02  # Share of its range below which a joint hardly moves
 MOST_JUMPS = 3  # Jumps of a log that are named
-DROPOUTS = 5  # Jumps of a log from which on samples are missing: an encoder slips once
 JUMPS = "jumps"  # What some warnings of logs are about
 STILL = 1e-3  # A joint that travels less than this share of what the busiest does is at rest, and trembles
 

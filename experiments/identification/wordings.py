@@ -103,6 +103,10 @@ WORDINGS: Mapping[tuple[str, str], Wording] = {
         "its columns are exchanged with those of {other}",
         by="exchange their names in the header; where columns are numbered, --joints {joints}",
     ),
+    ("dropouts", "log"): Wording(
+        "samples were dropped, held or repeated: {size}, the first at {instant}",
+        by="log without dropouts, or identify a part that has none",
+    ),
     ("missing_torque", "torque"): Wording(
         "its torque does not follow the motion: it was not logged, and its rows are left out", by="log it"
     ),

@@ -106,7 +106,7 @@ def report(
     lead = fit.estimates[fit.leading]
     hardest = judgement.hardest
     alike = {} if hardest is None else hardest.alike
-    cutoff = getattr(fit.processing.operator, "cutoff", None)
+    cutoff = fit.processing.cutoff
     return rendered(
         "idbench.experiments.reports",
         "identify.html.j2",

@@ -1,6 +1,6 @@
 """Whether the doctor names the faults that the runs of a study have."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 from idbench.experiments.identification.fitting import fit
 from idbench.experiments.identification.logs import Logs
@@ -11,9 +11,6 @@ from idbench.experiments.study.statistics import NAMED
 from idbench.identify import IdentificationError, MotionLog
 from idbench.identify.judge.suspect import Suspect
 from idbench.sim.scenario.faults import FAULTS, OF_PAIRS, Fault
-
-SAME = {"gravity": {"gravity", "tilt"}}
-"""Causes that are right beside that of a fault: a base that is tilted a little has another gravity."""
 
 
 def named_faults(method: Method, robot_model: RobotModel, log: MotionLog, faults: Sequence[Fault]) -> dict[str, float]:
@@ -29,14 +26,13 @@ def named_faults(method: Method, robot_model: RobotModel, log: MotionLog, faults
 
 def is_named(first: Suspect, joints: Sequence[str], faults: Sequence[Fault]) -> bool:
     """True if the first suspect, or a rival that is named with it, is one of the faults, of the joint that has it."""
-    rivals = {(first.cause, first.joint), *first.alternatives}
-    return any(_is(cause, None if j is None else joints[j], fault, joints) for fault in faults for cause, j in rivals)
-
-
-def _is(cause: str, joint: str | None, fault: Fault, joints: Sequence[str]) -> bool:
-    flaw = FAULTS[fault.kind]
-    near: Mapping[str, set[str]] = SAME
-    if cause not in near.get(flaw.cause[0], {flaw.cause[0]}):
-        return False
-    pair = joints[joints.index(fault.joint) + 1] if fault.kind in OF_PAIRS else fault.joint
-    return flaw.whole or not fault.joint or joint in (None, fault.joint, pair)
+    for fault in faults:
+        flaw, names = FAULTS[fault.kind], {None, fault.joint}
+        if fault.kind in OF_PAIRS:
+            names.add(joints[joints.index(fault.joint) + 1])
+        # A base that is tilted a little has another gravity.
+        causes = {flaw.cause[0], *(("tilt",) if flaw.cause[0] == "gravity" else ())}
+        for cause, j in ((first.cause, first.joint), *first.alternatives):
+            if cause in causes and (flaw.whole or not fault.joint or j is None or joints[j] in names):
+                return True
+    return False

@@ -15,16 +15,7 @@ from idbench.experiments.reports.figures import rendered
 from idbench.experiments.results.attempts import Attempts
 from idbench.experiments.results.folder import ResultsFolder
 from idbench.experiments.results.writing import finite, write_summary
-from idbench.experiments.study.answer import (
-    grouped,
-    headline,
-    in_words,
-    method,
-    percent,
-    settings_of,
-    short,
-    where,
-)
+from idbench.experiments.study.answer import grouped, headline, in_words, method, percent, settings_of, short, where
 from idbench.experiments.study.axis import FRICTION
 from idbench.experiments.study.cluster import versions
 from idbench.experiments.study.comparison import differences

@@ -50,6 +50,11 @@ class Basis:
         if twice := sorted(name for name, count in Counter(self.names).items() if count > 1):
             raise SettingError(f"two parameters are called {', '.join(twice)}: give one of them other letters")
 
+    @property
+    def hinges(self) -> list[int]:
+        """Joints that turn, from 0."""
+        return [j for j in range(self.n) if j not in self.slides]
+
     @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
         """The p parameters, in the order of X."""

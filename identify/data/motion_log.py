@@ -8,14 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from idbench.identify.arrays import Array, frozen
-from idbench.identify.errors import (
-    LogError,
-    SettingError,
-    TimeError,
-    require_finite,
-    require_not_negative,
-    require_positive,
-)
+from idbench.identify.errors import LogError, SettingError, TimeError, require_finite, require_not_negative, require_positive
 from idbench.identify.tables import html_table
 
 Meaning = Literal["instantaneous", "held", "averaged"]

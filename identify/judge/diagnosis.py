@@ -1,6 +1,6 @@
 """What is wrong with a fit: large mistakes and small ones; and which torques were not logged."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -8,6 +8,7 @@ import scipy
 
 from idbench.identify.arrays import TINY, Array
 from idbench.identify.basis.block import Kind
+from idbench.identify.data.jumps import jumps
 from idbench.identify.data.motion_log import MotionLog, never_logged
 from idbench.identify.estimators.problem import Problem
 from idbench.identify.judge.ripples import fast_ripples
@@ -28,6 +29,7 @@ UNRELATED = 0.8  # Share of a torque's squares that parameters of its own leave,
 SMOOTH = 0.5  # Correlation of a torque from row to row from which on it follows some motion: that of noise is 0.2
 ENOUGH = 4  # Rows a parameter from which on a torque is asked whether it follows the motion
 MOVES = 100.0  # Standard deviations of the noise of a position beyond which a joint moves, and does not flicker by a count
+DROPOUTS = 5  # Jumps of a log from which on samples are missing: an encoder slips once
 SAMPLES = 20.0  # Samples for each period of the operator's cut-off with which large mistakes are looked for
 
 
@@ -55,9 +57,8 @@ def diagnosed(problem: Problem, X: Array) -> tuple[Suspect, ...]:
         small = small_mistakes(mended, X)
     there = {(each.cause, each.joint) for each in whole}
     found = [*whole, *(each for each in small if (each.cause, each.joint) not in there)]
-    cutoff, waves = getattr(problem.own_chain.operator, "cutoff", None), {(each.setting, each.joint) for each in small}
-    fast = fast_ripples(mended, X, cutoff, CERTAIN, PROOF) if cutoff else ()
-    found += [each for each in fast if (each.setting, each.joint) not in waves]
+    waves = {(each.setting, each.joint) for each in small}
+    found += [each for each in fast_ripples(mended, X, CERTAIN, PROOF) if (each.setting, each.joint) not in waves]
     # Of a joint that something else is wrong with, friction may be negative, too.
     doubted = {each.joint for each in found}
     return (*(sign for sign in _impossible_signs(mended, X) if sign.joint not in doubted), *found)
@@ -101,7 +102,7 @@ def _sign(problem: Problem, j: int, t: float) -> Suspect:
 
 def _thinned(problem: Problem) -> Problem:
     """Return the problem of fewer samples, where there are many for the band of its rows: they show signs as well."""
-    cutoff = getattr(problem.own_chain.operator, "cutoff", None)
+    cutoff = problem.own_chain.cutoff
     return problem.with_logs(
         [_with_fewer(log, max(1, int(log.fs / (SAMPLES * cutoff))) if cutoff else 1) for log in problem.logs]
     )
@@ -115,6 +116,18 @@ def _with_fewer(log: MotionLog, every: int) -> MotionLog:
     return replace(
         log, fs=log.fs / every, q=log.q[..., ::every, :], tau=log.tau[..., ::every, :], torque=torque, conditions=conditions
     )
+
+
+def dropped_samples(logs: Sequence[MotionLog]) -> Suspect | None:
+    """Samples that were dropped, held or repeated, in the first log that jumps `DROPOUTS` times; None if none does."""
+    for k, log in enumerate(logs):
+        every = jumps(log.q, log.fs) if log.q.ndim == 2 and not log.poses else []
+        if len(every) >= DROPOUTS:
+            place, size = (every[0].sample / log.fs, k if len(logs) > 1 else None), float(len(every))
+            return Suspect(
+                "dropouts", "log", None, (size,), (0.0,), "jumps", 0.0, np.inf, (), (0.0, 0.0), np.inf, 0.0, 0.0, *place
+            )
+    return None
 
 
 def silent_joint(problem: Problem, X: Array) -> Suspect | None:

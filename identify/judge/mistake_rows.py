@@ -64,7 +64,7 @@ class MistakeRows:
     def every(self) -> list[Candidate]:
         """Return the mistakes of joints and of the robot, and those that are looked for from an instant on."""
         joints, of_joints = range(self.basis.n), [m for m in mistakes.OF_JOINTS if m is not mistakes.GAIN]
-        asked = [(m, j) for m in of_joints for j in (self._hinges if m is mistakes.ECCENTRIC else joints)]
+        asked = [(m, j) for m in of_joints for j in (self.basis.hinges if m is mistakes.ECCENTRIC else joints)]
         found = [*self._gains(), *self._made([*asked, *((m, None) for m in (*mistakes.OF_ROBOT, *mistakes.FROM_AN_INSTANT))])]
         slips = [replace(c, mistake=c.mistake._replace(cause="slip")) for c in found if c.mistake.cause == "zero"]
         held = [c for c in found if c.mistake in mistakes.FROM_AN_INSTANT]
@@ -116,7 +116,7 @@ class MistakeRows:
             return
         ones = [np.ones_like(x) for x in self._torques]
         for mistake, sizes in (mistakes.COGGING, ones), (mistakes.COMMUTATION, self._torques):
-            for j, k in likely_waves(self.parts, e, sizes, self._cutoff, self._hinges):
+            for j, k in likely_waves(self.parts, e, sizes, self._cutoff, self.basis.hinges):
                 plain = np.concatenate([_wave(part, j, k, x[j]) for part, x in zip(self.parts, sizes, strict=True)])
                 yield self._candidate(mistake._replace(setting=float(k)), j, plain)
 
@@ -129,15 +129,11 @@ class MistakeRows:
     def looks(self) -> int:
         """How many collisions, motions of the base and ripples are looked for."""
         kinds, count = self.parts[0].rows.kinds, len(self._time)
-        return count + 3 * count // (2 * kinds) + 2 * len(self._hinges) * len(WAVES)
+        return count + 3 * count // (2 * kinds) + 2 * len(self.basis.hinges) * len(WAVES)
 
     @property
     def _cutoff(self) -> float:
-        return getattr(self.parts[0].problem.own_chain.operator, "cutoff", None) or USUAL
-
-    @property
-    def _hinges(self) -> list[int]:
-        return [j for j in range(self.basis.n) if j not in self.basis.slides]
+        return self.parts[0].problem.own_chain.cutoff or USUAL
 
     @property
     def _step(self) -> float:

@@ -59,7 +59,7 @@ def likely_waves(
         yield from ((j, k) for k in sorted(likely))
 
 
-def fast_ripples(problem: Problem, X: Array, cutoff: float, certain: float, proof: float) -> Iterator[Suspect]:
+def fast_ripples(problem: Problem, X: Array, certain: float, proof: float) -> Iterator[Suspect]:
     """Yield ripples of hinges that rows have not, as they are above their band: samples of the torque have them.
 
         z_b = 2 sum e(t) x(t) exp(i k q(t)) / sum x(t)^2   over the instants of stretch b with k |qd| > 2 pi f_c
@@ -72,18 +72,17 @@ def fast_ripples(problem: Problem, X: Array, cutoff: float, certain: float, proo
         Of one run, whose rows are kept.
     X : Array, shape (p,)
         Its estimate.
-    cutoff : float
-        Band of the rows, f_c [Hz].
     certain : float
         Probability that any wave of any joint seems as significant by chance, below which one is suspected.
     proof : float
         Share of the squares of z_b that the mean of the other stretches may leave, and of residuals beyond noise.
     """
-    parts = problem.explicit.parts
+    if not (cutoff := problem.own_chain.cutoff) or problem.logs[0].poses:
+        return
+    parts, hinges = problem.explicit.parts, problem.basis.hinges
     torque = [torques(problem.basis, part.signals.state, X) for part in parts]
     measured = (replace(part.signals, prefilter=NoPrefilter()).torque.mean for part in parts)
     left = [tau - x for tau, x in zip(measured, torque, strict=True)]
-    hinges = [j for j in range(problem.basis.n) if j not in problem.basis.slides and not problem.logs[0].poses]
     for j in hinges:
         e, found, own = [x[j] for x in left], list[Suspect](), [x[j] for x in torque]
         first, noise = _squares(e), sum(float(np.sum(np.diff(x, 2) ** 2)) / 6 for x in e)

@@ -267,7 +267,7 @@ def _in_degrees(problem: Problem) -> Iterator[_Tried]:
     """Yield positions of hinges that are in degrees: of all, or of one. Without a torque nothing has a size."""
     n = problem.basis.n
     driven = problem.factors.R[:, :, -1].any(axis=1)
-    hinges = driven & np.array([j not in problem.basis.slides for j in range(n)])
+    hinges = driven & np.isin(np.arange(n), problem.basis.hinges)
     if not driven.all():
         return
     yield _Tried("unit", "position", None, (DEGREE,), _changed(problem, q=np.diag(np.where(hinges, DEGREE, 1.0))))

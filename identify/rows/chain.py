@@ -107,6 +107,11 @@ class Chain:
             return self
         return replace(self, operator=Windows())
 
+    @property
+    def cutoff(self) -> float | None:
+        """Band of the rows [Hz]; None of an operator that states none."""
+        return getattr(self.operator, "cutoff", None)
+
     def halo(self, fs: float, channel: TorqueChannel) -> float:
         """Reach of a row to either side of its instant [s], in a log at `fs` [Hz] with this torque channel."""
         torque = self.alignment.align(np.empty((0, 0)), channel, fs)  # how far it looks does not depend on the values

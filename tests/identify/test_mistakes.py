@@ -9,7 +9,7 @@ import pytest
 
 from idbench.identify import ESTIMATORS, estimate
 from idbench.identify.arrays import combined
-from idbench.identify.judge.diagnosis import diagnosed
+from idbench.identify.judge.diagnosis import diagnosed, dropped_samples
 from idbench.identify.judge.fitted_motion import FittedMotion
 from idbench.identify.judge.mistakes import OF_JOINTS, OF_ROBOT
 from idbench.identify.judge.whole_mistakes import DECISIVE, _likely, _others
@@ -169,3 +169,12 @@ def test_the_size_of_a_lateness_is_that_which_was_made(late):
     first = diagnosed(problem, estimate(problem, ESTIMATORS.create("GLS")).X)[0]
     assert (first.cause, first.joint) == ("delay", 2)
     assert first.size[0] == pytest.approx(late, rel=0.1)
+
+
+def test_dropped_samples_are_one_cause_and_a_slip_is_none():
+    one = logs.Lab("puma560", 0)
+    clean, dropped = one.log(0.5), one.log(0.5, logs.Fault("dropouts", 0.05))
+    slipped = one.log(0.5, logs.Fault("zero", 0.3, "joint2", 15.0))
+    assert dropped_samples([clean, slipped]) is None
+    found = dropped_samples([clean, dropped])
+    assert (found.cause, found.joint, found.log) == ("dropouts", None, 1)
