@@ -107,7 +107,12 @@ PAGES = {
 """Pages that are photographed, and the commands that write them."""
 
 
-CHARTS = {"conclusion": "conclusion_tables", "benchmark": "benchmark_tables", "estimators": "estimator_tables"}
+CHARTS = {
+    "conclusion": "conclusion_tables",
+    "benchmark": "benchmark_tables",
+    "estimators": "estimator_tables",
+    "faults": "fault_tables",
+}
 """Pictures that are drawn from the figures in docs/results, and the module of docs/build that draws them."""
 
 REAL = {

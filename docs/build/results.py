@@ -37,7 +37,14 @@ def keep(folder: Path) -> None:
             kept = {name: summary[name] for name in ("parameters", "attribution_percent")}
             (RESULTS / f"{path.parent.name}.json").write_text(json.dumps(kept, indent=1) + "\n")
             continue
-        kept_of = (*KEPT, *COMPARED) if path.parent.name.startswith("estimators") else KEPT
+        named = ("settings", "runs", "named", "misnamed")
+        kept_of = (
+            named
+            if "named" in summary["cells"][0]
+            else (*KEPT, *COMPARED)
+            if path.parent.name.startswith("estimators")
+            else KEPT
+        )
         cells = [{key: short(cell.get(key)) for key in kept_of if key in cell} for cell in summary["cells"]]
         text = "[\n" + ",\n".join(json.dumps(cell) for cell in cells) + "\n]\n"
         (RESULTS / f"{path.parent.name}.json").write_text(text)

@@ -19,6 +19,7 @@ from conclusion_sentences import sentences
 from conclusion_tables import CONCLUSION_TABLES, keep_conclusion
 from estimator_tables import compared, compared_in_birdys_shape
 from excitation_tables import coarse, criteria, foretold, motions, ranks
+from fault_tables import cogging
 from results import DOCS, RESULTS, Cell, Column, by_settings, cells, coverage, keep, table, typical
 from reversal_tables import reversals
 from simulated_tables import SIMULATED_TABLES
@@ -169,6 +170,7 @@ TABLES: dict[str, Callable[[], Iterator[str]]] = {
     "estimators-idbench": compared("idbench"),
     "estimators-unfiltered": compared("unfiltered"),
     "estimators-puma560": compared_in_birdys_shape,
+    "ripple-named": cogging,
     **BENCHMARK_TABLES,
     "sentences": sentences,
     **CONCLUSION_TABLES,

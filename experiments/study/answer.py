@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from itertools import takewhile
 from math import comb, log2
 from typing import Any
 
@@ -148,18 +149,18 @@ HALF = 0.5  # Share of the runs in which a fault is named, from which on it coun
 
 
 def smallest_named(cells: Sequence[Cell], field: str) -> str:
-    """Least value of a setting from which on faults are named in most of the runs, for each combination of the others."""
-    groups, found = dict[str, list[Cell]](), list[str]()
-    for cell in sorted(cells, key=lambda cell: cell.settings[field]):
-        others = [f"{short(name)} {in_words(x)}" for name, x in settings_of(cell).items() if name != field]
-        groups.setdefault(", ".join(others) or "the fault", []).append(cell)
+    """Least values of a setting from which on faults are named in most of the runs, each with the other settings."""
+    groups, found = dict[str, list[Cell]](), dict[str, list[str]]()
+    for cell in cells:
+        others = " ".join(in_words(x) for name, x in settings_of(cell).items() if name != field)
+        groups.setdefault(others or "the fault", []).append(cell)
     for title, group in groups.items():
-        seen = [cell.named_share[0] >= HALF for cell in group]
-        first = next((k for k in range(len(seen)) if all(seen[k:])), None)
-        found.append(f"{title}: {'never' if first is None else f'from {in_words(group[first].settings[field])} on'}")
+        rising = sorted(group, key=lambda cell: cell.settings[field], reverse=True)
+        seen = list(takewhile(lambda cell: cell.named_share[0] >= HALF, rising))
+        found.setdefault(f"from {in_words(seen[-1].settings[field])} on" if seen else "never", []).append(title)
+    each = "; ".join(f"{first}: {', '.join(titles)}" for first, titles in sorted(found.items()))
     wrong = np.mean([cell.named_share[1] for cell in cells])
-    runs = f"another cause is named in {percent(float(wrong))} of the runs"
-    return f"Faults are named in most runs, by {field}: {'; '.join(found)}. In all, {runs}."
+    return f"In most runs a fault is named by {field} {each}. Another cause is named in {percent(float(wrong))} of all runs."
 
 
 def failures(cells: Sequence[Cell]) -> str:

@@ -53,17 +53,16 @@ def named_figure(families: Mapping[str, Sequence[Cell]], axis: Axis) -> str:
     at = {axis.label(value): k for k, value in enumerate(axis.points)}
     shares = np.full((len(families), len(at)), np.nan)
     for row, cells in zip(shares, families.values(), strict=True):
-        for cell in cells:
-            row[at[cell.settings[axis.field]]] = 100 * cell.named_share[0]
+        row[[at[cell.settings[axis.field]] for cell in cells]] = [100 * cell.named_share[0] for cell in cells]
     columns = [in_words(label) for label in at]
-    return matrix_figure([*families], columns, shares, f"runs whose fault is named [%], by {axis.field}", log=False)
+    return svg(matrix([*families], columns, shares, f"runs whose fault is named [%], by {axis.field}", log=False))
 
 
 def error_figure(cells: Sequence[Cell], axis: Axis) -> str:
     """Return spread and bias of every parameter against an axis, a curve a model; of many parameters their rms error."""
     if len(cells[0].parameters) > MANY:
         values = 100 * np.array([cell.rmse for cell in cells])
-        return matrix_figure(_rows_of(cells, axis), cells[0].parameters, values, "rms error [%]")
+        return svg(matrix(_rows_of(cells, axis), cells[0].parameters, values, "rms error [%]"))
     figure, panels = _panels(cells[0].parameters)
     for p, panel in enumerate(panels.values()):
         for model, group, x, style in _curves(panel, cells, axis):
@@ -82,7 +81,7 @@ def coverage_figure(cells: Sequence[Cell], axis: Axis) -> str:
     if len(cells[0].parameters) > MANY:
         values = 100 * np.array([cell.coverage(cell.sigma) for cell in cells])
         title = f"truth within {SIGMAS:g} sigma [%]"
-        return matrix_figure(_rows_of(cells, axis), cells[0].parameters, values, title, log=False)
+        return svg(matrix(_rows_of(cells, axis), cells[0].parameters, values, title, log=False))
     figure, panels = _panels(cells[0].parameters)
     for p, panel in enumerate(panels.values()):
         panel.axhline(100 * RIGHT, color="black", lw=1.0, ls="--")
@@ -96,18 +95,18 @@ def coverage_figure(cells: Sequence[Cell], axis: Axis) -> str:
     return svg(_finished(figure, panels, axis.field, f"truth within {SIGMAS:g} sigma [%]"))
 
 
-def matrix_figure(rows: Sequence[str], parameters: Sequence[str], values: Array, title: str, *, log: bool = True) -> str:
-    """Return numbers of many parameters as one picture: a row each of `rows`, a column a parameter, a colour a number."""
+def matrix(rows: Sequence[str], columns: Sequence[str], values: Array, title: str, *, log: bool = True) -> Figure:
+    """Return numbers as one picture: a row each of `rows`, a column each of `columns`, a colour a number."""
     figure = Figure(figsize=(12, 1.4 + 0.24 * len(rows)), layout="constrained")
     panel: Any = figure.subplots()
     shown = np.where(values > 0, values, np.nan) if log else values
     norm = LogNorm() if log and np.isfinite(shown).any() else None
     image = panel.imshow(shown, aspect="auto", cmap="viridis", norm=norm)
     panel.set_yticks(range(len(rows)), rows)
-    panel.set_xticks(range(len(parameters)), parameters, rotation=90, fontsize=7)
+    panel.set_xticks(range(len(columns)), columns, rotation=90, fontsize=7)
     panel.grid(visible=False)
     figure.colorbar(image, ax=panel, label=title)
-    return svg(figure)
+    return figure
 
 
 def _rows_of(cells: Sequence[Cell], axis: Axis) -> list[str]:
@@ -118,7 +117,7 @@ def bars_figure(cells: Sequence[Cell]) -> str:
     """Return mean and standard deviation of every parameter's error, a bar a method; of many parameters their rms errors."""
     names, parameters = [_name(cell, cells) for cell in cells], cells[0].parameters
     if len(parameters) > MANY:
-        return matrix_figure(names, parameters, 100 * np.array([cell.rmse for cell in cells]), "rms error [%]")
+        return svg(matrix(names, parameters, 100 * np.array([cell.rmse for cell in cells]), "rms error [%]"))
     numbers = ([cell.bias for cell in cells], [cell.deviation for cell in cells], [cell.least() for cell in cells])
     return svg(bars(names, parameters, *(100 * np.array(x) for x in numbers), runs=max(cell.runs for cell in cells)))
 

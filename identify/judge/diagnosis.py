@@ -103,19 +103,15 @@ def _sign(problem: Problem, j: int, t: float) -> Suspect:
 def _thinned(problem: Problem) -> Problem:
     """Return the problem of fewer samples, where there are many for the band of its rows: they show signs as well."""
     cutoff = problem.own_chain.cutoff
-    return problem.with_logs(
-        [_with_fewer(log, max(1, int(log.fs / (SAMPLES * cutoff))) if cutoff else 1) for log in problem.logs]
-    )
+    steps = [max(1, int(log.fs / (SAMPLES * cutoff))) if cutoff else 1 for log in problem.logs]
+    return problem if max(steps) == 1 else problem.with_logs(list(map(_with_fewer, problem.logs, steps)))
 
 
 def _with_fewer(log: MotionLog, every: int) -> MotionLog:
-    if every == 1:
-        return log
     torque = replace(log.torque, period=log.torque.period or 1 / log.fs)
     conditions = {name: x[..., ::every, :] for name, x in log.conditions.items()}
-    return replace(
-        log, fs=log.fs / every, q=log.q[..., ::every, :], tau=log.tau[..., ::every, :], torque=torque, conditions=conditions
-    )
+    q, tau = (x[..., ::every, :] for x in (log.q, log.tau))
+    return replace(log, fs=log.fs / every, q=q, tau=tau, torque=torque, conditions=conditions)
 
 
 def dropped_samples(logs: Sequence[MotionLog]) -> Suspect | None:

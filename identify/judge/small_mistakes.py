@@ -257,7 +257,7 @@ class _Search:
             p,
             float(np.sqrt(best.chi2)),
             tuple(others),
-            errors,
+            (0.0, 0.0) if candidate.mistake is COLLISION else errors,  # nothing predicts what happens once
             best.gain,
             candidate.mistake.setting,
             0.0,

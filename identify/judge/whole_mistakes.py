@@ -81,6 +81,9 @@ def whole_mistakes(problem: Problem, small: Suspect | None = None) -> list[Suspe
     nearly the same, the first is taken: simple and common ones are tried first.
     """
     explicit = problem.explicit
+    before_errors, noise = held_out_errors(explicit), noise_errors(explicit)
+    if not (before_errors > noise).any():  # nothing is left that one could explain
+        return []
     before, counts = float(explicit.factors.misfit()), explicit.factors.rows
     tried = [*_gains(explicit), *_gravities(explicit), *(_rates(explicit) if small else ())]
     if small or _worst(explicit) > POOR:
@@ -88,7 +91,6 @@ def whole_mistakes(problem: Problem, small: Suspect | None = None) -> list[Suspe
     gains = [(float(each.like.factors.misfit(counts)) if each.like else before) - each.misfit(counts) for each in tried]
     most = max(gains, default=0.0)
     found = sorted(zip(gains, tried, strict=True), key=lambda one: -one[0] if one[0] < NEARLY_ALL * most else -np.inf)
-    before_errors, noise = held_out_errors(explicit), noise_errors(explicit)
     for gain, best in found[:MOST]:
         if gain < DECISIVE or (small and gain < NEARLY * small.evidence):
             break

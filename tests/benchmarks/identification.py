@@ -25,6 +25,7 @@ from idbench.identify import (
     scara,
     tree_basis,
 )
+from idbench.identify.models import THREE
 from idbench.sim.scenario.scenario_file import load
 
 SAMPLES, RUNS = 4000, 60
@@ -46,7 +47,7 @@ def main() -> None:
     log = MotionLog(100.0, table.log.q[part], table.log.tau[part], table.log.torque)
     q, qd, qdd = (getattr(table.reference, name)[part] for name in ("q", "qd", "qdd"))
     model = planar_arm()
-    data, basis, models = model.createData(), scara(), {name: MODELS.create(name) for name in MODELS}
+    data, basis, models = model.createData(), scara(), {name: MODELS.create(name) for name in THREE}
 
     def peer() -> None:
         W = np.empty((SAMPLES, model.nv, 10 * model.nv))

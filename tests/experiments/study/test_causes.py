@@ -49,7 +49,7 @@ def test_a_gain_of_a_fifth_is_named_and_one_of_a_fiftieth_of_a_per_cent_is_not(f
         (0.001, 0.0, 0.0),
         (1.0, 1.0, 0.0),
     ]
-    assert "the fault: from 1 on" in summary["answer"]
+    assert "from 1 on: the fault" in summary["answer"]
     assert "runs whose fault is named" in (folder / "report.html").read_text()
 
 
