@@ -231,10 +231,5 @@ class _PositionLaw(AbstractLaw):
 CONTROLLERS: PluginTable[AbstractController] = PluginTable(
     "controllers",
     AbstractController,  # type: ignore[type-abstract]  # only asked whether an instance is one
-    {
-        "pd": PDFeedforward,
-        "pid": PID,
-        "computed_torque": ComputedTorque,
-        "position": PositionCommand,
-    },
+    {"pd": PDFeedforward, "pid": PID, "computed_torque": ComputedTorque, "position": PositionCommand},
 )

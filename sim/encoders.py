@@ -129,8 +129,5 @@ class _Reader(AbstractReader):
 ENCODERS: PluginTable[AbstractEncoder] = PluginTable(
     "encoders",
     AbstractEncoder,  # type: ignore[type-abstract]  # only asked whether an instance is one
-    {
-        "exact": ExactEncoder,
-        "incremental": IncrementalEncoder,
-    },
+    {"exact": ExactEncoder, "incremental": IncrementalEncoder},
 )

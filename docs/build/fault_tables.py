@@ -12,16 +12,19 @@ STUDY = "faults"
 def picture(place: Path) -> None:
     """Draw the share of the runs of each fault that is named: a row a kind, a column a noise and a severity."""
     from idbench.experiments.study.figures import matrix
+    from idbench.experiments.study.study_file import load_study
+    from idbench.sim.scenario.faults import FAULTS
 
-    found = cells(STUDY)
-    kinds = list(dict.fromkeys(cell["settings"]["kind"] for cell in found))
+    found, (kinds, *_) = cells(STUDY), load_study(STUDY).axes
     columns = list(dict.fromkeys((cell["settings"]["noise"], cell["settings"]["severity"]) for cell in found))
-    shares = np.full((len(kinds), len(columns)), np.nan)
+    shares = np.full((len(kinds.cases), len(columns)), np.nan)
     for cell in found:
         s = cell["settings"]
-        shares[kinds.index(s["kind"]), columns.index((s["noise"], s["severity"]))] = 100 * cell["named"]
-    heads = [f"{noise} noise, severity {severity:g}" for noise, severity in columns]
-    matrix(kinds, heads, shares, "runs whose fault is named [%]", log=False).savefig(place, dpi=80)
+        shares[list(kinds.cases).index(s["kind"]), columns.index((s["noise"], s["severity"]))] = 100 * cell["named"]
+    sizes = {kind: case["fault"][0]["size"] for kind, case in kinds.cases.items()}
+    rows = [f"{kind} {size:g} {FAULTS[kind].unit.removeprefix('1')}".strip() for kind, size in sizes.items()]
+    heads = [f"{noise}, times {severity:g}" for noise, severity in columns]
+    matrix(rows, heads, shares, "runs whose fault is named [%]", log=False).savefig(place, dpi=80)
 
 
 def cogging() -> Iterator[str]:
@@ -36,5 +39,5 @@ def cogging() -> Iterator[str]:
 
 
 def _least(shares: list[tuple[float, float]]) -> str:
-    seen = [size for size, _ in shares if all(named >= 0.5 for other, named in shares if other >= size)]
+    seen = [size for size, _ in shares if all(named > 0.5 for other, named in shares if other >= size)]
     return f"{0.4 * min(seen):.2g} N m" if seen else "none"

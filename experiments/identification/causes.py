@@ -157,7 +157,8 @@ class Cause:
 
     def _cutoff(self) -> str:
         """The option by which rows have the ripples that are above their band; empty where samples hardly have them."""
-        band = max(BEYOND * each.band for each in self.every or (self.suspect,))
+        every = [each for each in self.every or (self.suspect,) if WORDINGS[each.cause, each.of].law]
+        band = BEYOND * max((each.band for each in every), default=0.0)
         return f" --cutoff {np.ceil(band):.0f}" if 0 < band < MOST_BAND * self.log.fs else ""
 
     def _gains(self) -> str:

@@ -69,7 +69,7 @@ class Fit:
         All else may be the doing of samples that were dropped.
         """
         if dropped := dropped_samples(self.logs.fitted):
-            return causes_of((dropped,), self.robot_model, self.logs.fitted[0])
+            return causes_of((*self.silent, dropped), self.robot_model, self.logs.fitted[0])
         try:
             suspects = diagnosed(self.problem, self.estimates[self.leading].X)
             unknown = () if suspects else tuple(something_else(self.motion_shares))

@@ -113,8 +113,10 @@ def notes_of(made: Fit) -> tuple[str, ...]:
 def truth_of(asked: IdentifyRequest, request: Request) -> dict[str, float] | None:
     """Return the truth that the folder of a run states, if it is of the same parameters."""
     stated = stated_by(asked.log[0])
-    truth: dict[str, float] | None = stated.get("truth")
-    return truth | stated["further_truth"] if truth and tuple(truth) == request.robot_model.basis.names else None
+    truth: dict[str, float] = stated.get("truth") or {}
+    further = stated.get("further_truth", {})
+    own = tuple(name for name in request.robot_model.basis.names if name in truth or name not in further)
+    return truth | further if truth and tuple(truth) == own else None
 
 
 def chooses_band(asked: IdentifyRequest) -> bool:

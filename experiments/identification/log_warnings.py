@@ -8,7 +8,7 @@ from idbench.experiments.identification.fit import Fit
 from idbench.experiments.note import Note, noted
 from idbench.identify import Array, Joint, KinematicTree, MotionLog, Problem
 from idbench.identify.basis.block import FRICTION, RIGID, Kind
-from idbench.identify.data.jumps import Jump, jumps
+from idbench.identify.data.jumps import Jump, dropouts, jumps
 from idbench.identify.data.kinematics import GROUND
 from idbench.identify.judge.diagnosis import DROPOUTS
 
@@ -105,7 +105,7 @@ def jumps_of(log: MotionLog) -> list[Jump]:
 def _of_jumps(log: MotionLog, tree: KinematicTree) -> Iterator[str]:
     """Yield the first jumps of a log, by joint, sample and speed."""
     every = jumps_of(log)
-    if len(every) >= DROPOUTS:
+    if dropouts(every) >= DROPOUTS:
         first, k = tree.joints[every[0].joint].name, every[0].sample
         yield Note(
             f"{len(every)} jumps, the first of {first} at sample {k} ({k / log.fs:.4g} s): samples were dropped, "

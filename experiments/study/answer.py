@@ -145,18 +145,19 @@ def _sigmas(cells: Sequence[Cell]) -> str:
     return f"The true value lies within two standard errors in {' and '.join(shares)} of cases; 95 % would be right."
 
 
-HALF = 0.5  # Share of the runs in which a fault is named, from which on it counts as seen
+HALF = 0.5  # Share of the runs in which a fault is named, above which it counts as seen
 
 
 def smallest_named(cells: Sequence[Cell], field: str) -> str:
     """Least values of a setting from which on faults are named in most of the runs, each with the other settings."""
     groups, found = dict[str, list[Cell]](), dict[str, list[str]]()
     for cell in cells:
-        others = " ".join(in_words(x) for name, x in settings_of(cell).items() if name != field)
-        groups.setdefault(others or "the fault", []).append(cell)
+        others = [in_words(x) for name, x in settings_of(cell).items() if name != field]
+        others += [method(cell, cells)] if len({method(each, cells) for each in cells}) > 1 else []
+        groups.setdefault(" ".join(others) or "the fault", []).append(cell)
     for title, group in groups.items():
         rising = sorted(group, key=lambda cell: cell.settings[field], reverse=True)
-        seen = list(takewhile(lambda cell: cell.named_share[0] >= HALF, rising))
+        seen = list(takewhile(lambda cell: cell.named_share[0] > HALF, rising))
         found.setdefault(f"from {in_words(seen[-1].settings[field])} on" if seen else "never", []).append(title)
     each = "; ".join(f"{first}: {', '.join(titles)}" for first, titles in sorted(found.items()))
     wrong = np.mean([cell.named_share[1] for cell in cells])

@@ -25,14 +25,18 @@ def named_faults(method: Method, robot_model: RobotModel, log: MotionLog, faults
 
 
 def is_named(first: Suspect, joints: Sequence[str], faults: Sequence[Fault]) -> bool:
-    """True if the first suspect, or a rival that is named with it, is one of the faults, of the joint that has it."""
+    """True if the first suspect, or a rival that is named with it, is one of the faults, of the joint that has it.
+
+    The first is a mistake of the same thing, too; rivals have a cause and a joint alone. A cause of all joints is none of one.
+    """
     for fault in faults:
-        flaw, names = FAULTS[fault.kind], {None, fault.joint}
+        flaw, names = FAULTS[fault.kind], {fault.joint}
         if fault.kind in OF_PAIRS:
             names.add(joints[joints.index(fault.joint) + 1])
         # A base that is tilted a little has another gravity.
         causes = {flaw.cause[0], *(("tilt",) if flaw.cause[0] == "gravity" else ())}
-        for cause, j in ((first.cause, first.joint), *first.alternatives):
-            if cause in causes and (flaw.whole or not fault.joint or j is None or joints[j] in names):
+        of_same = first.of == flaw.cause[1]
+        for cause, j in ((first.cause, first.joint),) * of_same + first.alternatives:
+            if cause in causes and (flaw.whole or not fault.joint or (j is not None and joints[j] in names)):
                 return True
     return False

@@ -9,7 +9,7 @@ import numpy as np
 from idbench.experiments.study.answer import answer, combination, failures, smallest_named
 from idbench.experiments.study.comparison import ln_typical
 from idbench.experiments.study.statistics import CONFIDENCE, Cell
-from idbench.experiments.study.study import Study
+from idbench.experiments.study.study import SEVERITY, Study
 from idbench.experiments.text import new_table
 from idbench.identify.models import THREE
 
@@ -134,7 +134,7 @@ def interval(row: RatioRow) -> str:
 
 def study_answer(study: Study, found: Sequence[Cell]) -> str:
     """Return the answer of a study: which faults are named, the ratios of the models' errors, or which method errs least."""
-    if study.causes and (solved := [cell for cell in found if cell.runs]):
+    if study.main_axis.field == SEVERITY and study.causes and (solved := [cell for cell in found if cell.runs]):
         return " ".join(filter(None, (smallest_named(solved, study.main_axis.field), failures(found))))
     if not (compares_models(study) and any(cell.runs for cell in found)):
         return answer(found, study.edges)

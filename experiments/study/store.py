@@ -47,9 +47,9 @@ def runs_of(path: Path) -> range:
 def require_of(path: Path, study: Study) -> None:
     """Raise StudyError unless a shard is of this study as it is now, made by the same versions, and whole."""
     metadata = shard_header(path)
+    require_versions(json.loads(metadata.get("versions", "{}")), f"the maker of {path.name}")
     if metadata.get("fingerprint") != study.fingerprint:
         raise StudyError(f"study.toml was changed since {path.name} was made: undo the change, or begin anew in another --out")
-    require_versions(json.loads(metadata["versions"]), f"the maker of {path.name}")
     expected = len(runs_of(path)) * len(study.methods) * len(study.models)
     if (rows := pq.read_metadata(path).num_rows) != expected:
         raise StudyError(f"{path} has {rows} rows, its name and the study say {expected}: remove it, and go on with --resume")

@@ -239,7 +239,8 @@ class Study:
     @property
     def main_axis(self) -> Axis:
         """The axis with the most values, of a study of causes the severity of the faults: figures are drawn against it."""
-        return max(self.every_axis, key=lambda axis: (self.causes and axis.field == SEVERITY, len(axis.points)))
+        axes = [axis for axis in self.every_axis if axis.field in self.varied]
+        return max(axes, key=lambda axis: (self.causes and axis.field == SEVERITY, len(axis.points)))
 
     @property
     def varied(self) -> tuple[str, ...]:

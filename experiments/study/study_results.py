@@ -157,7 +157,7 @@ def print_study(page: Console, study: Study, found: Sequence[Cell]) -> None:
         numbers = f"{cell.runs}", f"{cell.failed or ''}"
         bounds = [percent(cell.typical_least(bound)) for bound in BOUNDS] if least else []
         errors = [percent(cell.typical), *bounds] if cell.runs else [""] * (1 + len(least))
-        shares = [percent(share) for share in cell.named_share] if causes else []
+        shares = [percent(share) if cell.runs else "" for share in cell.named_share] if causes else []
         judged = *errors, _held(cell), *([_often(cell)] if often else []), *shares
         grid.add_row(*settings, method(cell, found), *numbers, *judged)
     grid.columns[0].header = axes[0]

@@ -1,6 +1,6 @@
 """Jumps of logged positions: wild samples, and encoders that slip."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import comb
 
@@ -98,6 +98,12 @@ def jumps(q: Array, fs: float) -> list[Jump]:
     tremble = COUNTS * np.where(np.isfinite(steps), steps, usual)
     least = np.maximum(tremble, ROUNDING * np.ptp(q, axis=0).max(initial=0.0))
     return [jump for j, x in enumerate(q.T) for jump in _of_joint(j, np.asarray(x), float(least[j]), fs)]
+
+
+def dropouts(found: Sequence[Jump]) -> int:
+    """Number of instants at which positions jump for good; joints that jump together count once, and neighbours do."""
+    at = sorted({jump.sample for jump in found if not jump.back})
+    return sum(k == 0 or at[k] - at[k - 1] > NEAR for k in range(len(at)))
 
 
 def _of_joint(j: int, x: Array, least: float, fs: float) -> list[Jump]:

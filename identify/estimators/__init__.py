@@ -6,12 +6,8 @@ from idbench.identify.estimators.least_squares.iteratively_reweighted import Ite
 from idbench.identify.estimators.least_squares.ordinary_weighted_generalized import (
     GeneralizedLeastSquares as GeneralizedLeastSquares,
 )
-from idbench.identify.estimators.least_squares.ordinary_weighted_generalized import (
-    OrdinaryLeastSquares as OrdinaryLeastSquares,
-)
-from idbench.identify.estimators.least_squares.ordinary_weighted_generalized import (
-    WeightedLeastSquares as WeightedLeastSquares,
-)
+from idbench.identify.estimators.least_squares.ordinary_weighted_generalized import OrdinaryLeastSquares as OrdinaryLeastSquares
+from idbench.identify.estimators.least_squares.ordinary_weighted_generalized import WeightedLeastSquares as WeightedLeastSquares
 from idbench.identify.estimators.least_squares.recursive_least_squares import RecursiveLeastSquares as RecursiveLeastSquares
 from idbench.identify.estimators.least_squares.selected_rows import SelectedRows as SelectedRows
 from idbench.identify.estimators.least_squares.total_least_squares import TotalLeastSquares as TotalLeastSquares

@@ -50,12 +50,7 @@ class Estimate:
 
     @classmethod
     def judge(
-        cls,
-        problem: Problem,
-        X: npt.ArrayLike,
-        covariance: npt.ArrayLike | None = None,
-        *,
-        influence: Array | None = None,
+        cls, problem: Problem, X: npt.ArrayLike, covariance: npt.ArrayLike | None = None, *, influence: Array | None = None
     ) -> Self:
         """Return the estimate X of a problem.
 

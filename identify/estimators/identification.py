@@ -99,11 +99,7 @@ def identify_each(
 
 
 def attempt_each(
-    problem: Problem,
-    models: Mapping[str, AbstractModel],
-    estimator: AbstractEstimator | None = None,
-    *,
-    throw: bool = True,
+    problem: Problem, models: Mapping[str, AbstractModel], estimator: AbstractEstimator | None = None, *, throw: bool = True
 ) -> dict[str, Estimate | IdentificationError]:
     """Identify with several models; return the estimate of each, or why it has none: one does not take the others' away.
 
@@ -157,11 +153,7 @@ def estimate(problem: Problem, estimator: AbstractEstimator, *, throw: bool = Tr
 
 
 def _problem(
-    log: MotionLog | Sequence[MotionLog],
-    basis: Basis,
-    model: AbstractModel,
-    chain: Chain | None,
-    simulation: Simulation | None,
+    log: MotionLog | Sequence[MotionLog], basis: Basis, model: AbstractModel, chain: Chain | None, simulation: Simulation | None
 ) -> Problem:
     chain = chain or idbench_chain()
     _require(log, Sequence, "a MotionLog or a sequence of them, such as read_log(path)", MotionLog)

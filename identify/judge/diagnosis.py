@@ -8,7 +8,7 @@ import scipy
 
 from idbench.identify.arrays import TINY, Array
 from idbench.identify.basis.block import Kind
-from idbench.identify.data.jumps import jumps
+from idbench.identify.data.jumps import dropouts, jumps
 from idbench.identify.data.motion_log import MotionLog, never_logged
 from idbench.identify.estimators.problem import Problem
 from idbench.identify.judge.ripples import fast_ripples
@@ -29,7 +29,7 @@ UNRELATED = 0.8  # Share of a torque's squares that parameters of its own leave,
 SMOOTH = 0.5  # Correlation of a torque from row to row from which on it follows some motion: that of noise is 0.2
 ENOUGH = 4  # Rows a parameter from which on a torque is asked whether it follows the motion
 MOVES = 100.0  # Standard deviations of the noise of a position beyond which a joint moves, and does not flicker by a count
-DROPOUTS = 5  # Jumps of a log from which on samples are missing: an encoder slips once
+DROPOUTS = 5  # Instants at which a log jumps from which on samples are missing: an encoder slips once
 SAMPLES = 20.0  # Samples for each period of the operator's cut-off with which large mistakes are looked for
 
 
@@ -118,8 +118,8 @@ def dropped_samples(logs: Sequence[MotionLog]) -> Suspect | None:
     """Samples that were dropped, held or repeated, in the first log that jumps `DROPOUTS` times; None if none does."""
     for k, log in enumerate(logs):
         every = jumps(log.q, log.fs) if log.q.ndim == 2 and not log.poses else []
-        if len(every) >= DROPOUTS:
-            place, size = (every[0].sample / log.fs, k if len(logs) > 1 else None), float(len(every))
+        if dropouts(every) >= DROPOUTS:
+            place, size = (every[0].sample / log.fs, k if len(logs) > 1 else None), float(dropouts(every))
             return Suspect(
                 "dropouts", "log", None, (size,), (0.0,), "jumps", 0.0, np.inf, (), (0.0, 0.0), np.inf, 0.0, 0.0, *place
             )

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -20,6 +19,7 @@ LIKELY = 2  # Numbers of waves that residuals have most of, for each joint, whos
 APART = 2  # Waves about these whose columns are made, too: parameters have taken a part of what residuals had
 STRETCHES = 10  # Of the samples: the others predict the ripple of each
 ENOUGH = 5000  # Samples of a log that are looked at: a ripple of 2 % of a torque with 5 % of noise is 28 sigma of so many
+FEWEST = 10  # Samples of a stretch
 SEEN = 0.02  # Share of the motion in which a wave must be within the band of the rows
 
 
@@ -64,7 +64,8 @@ def fast_ripples(problem: Problem, X: Array, certain: float, proof: float) -> It
 
         z_b = 2 sum e(t) x(t) exp(i k q(t)) / sum x(t)^2   over the instants of stretch b with k |qd| > 2 pi f_c
 
-    Scores of waves that are not there scatter as chi squared with two degrees of freedom, with the median of them all.
+    Scores of waves that are not there scatter as chi squared with two degrees of freedom, with the median of them all. Each
+    stretch is predicted by the others, and what is left beyond white noise then is at most a share.
 
     Parameters
     ----------
@@ -75,78 +76,60 @@ def fast_ripples(problem: Problem, X: Array, certain: float, proof: float) -> It
     certain : float
         Probability that any wave of any joint seems as significant by chance, below which one is suspected.
     proof : float
-        Share of the squares of z_b that the mean of the other stretches may leave, and of residuals beyond noise.
+        Share of the squares of z_b that the other stretches may leave, and of residuals beyond noise.
     """
     if not (cutoff := problem.own_chain.cutoff) or problem.logs[0].poses:
         return
-    parts, hinges = problem.explicit.parts, problem.basis.hinges
-    torque = [torques(problem.basis, part.signals.state, X) for part in parts]
-    measured = (replace(part.signals, prefilter=NoPrefilter()).torque.mean for part in parts)
-    left = [tau - x for tau, x in zip(measured, torque, strict=True)]
+    hinges, signals = problem.basis.hinges, [part.signals for part in problem.explicit.parts]
+    predicted = [torques(problem.basis, one.state, X) for one in signals]
+    measured = [replace(one, prefilter=NoPrefilter()).torque.mean for one in signals]
     for j in hinges:
-        e, found, own = [x[j] for x in left], list[Suspect](), [x[j] for x in torque]
-        first, noise = _squares(e), sum(float(np.sum(np.diff(x, 2) ** 2)) / 6 for x in e)
-        for _ in range(LIKELY):
-            kinds = [_fastest(parts, j, e, x, cutoff) for x in ([np.ones_like(x) for x in own], own)]
-            of = int(np.argmax([one.score for one in kinds]))
-            wave, p = kinds[of], len(hinges) * kinds[of].p
-            z = np.concatenate([_by_stretch(x, unit) for x, unit in zip(e, wave.units, strict=True)])
-            others = (z.sum() - z) / max(len(z) - 1, 1)
-            if p > certain or len(z) < STRETCHES or np.sum(np.abs(z - others) ** 2) > proof * np.sum(np.abs(z) ** 2):
-                break
-            before, e = e, [x - (z.mean().conjugate() * unit).real for x, unit in zip(e, wave.units, strict=True)]
-            before_after = tuple(float(100 * np.sqrt(_squares(x) / max(_squares(own), TINY))) for x in (before, e))
-            found.append(wave.suspect(j, of, z, p, (before_after[0], before_after[1])))
-        # What is left beyond white noise, of which squares of second differences have six times as much.
-        yield from found if _squares(e) - noise < proof * (first - noise) else ()
+        each = zip(signals, measured, predicted, strict=True)
+        rows = [np.array([s.state.q[j], s.state.qd[j], tau[j], own[j]]) for s, tau, own in each if j not in s.log.missing]
+        if rows:
+            yield from _fast_of_joint(j, np.concatenate(rows, axis=1), cutoff, certain / len(hinges), proof)
 
 
-class _FastWave(NamedTuple):
-    """The wave that samples above a band have most of."""
+def _fast_of_joint(j: int, rows: Array, cutoff: float, certain: float, proof: float) -> Iterator[Suspect]:
+    """Ripples of a joint above a band [Hz], of samples (q, qd, measured and predicted torque), shape (4, time)."""
+    q, qd, measured, predicted = rows
+    e, found = measured - predicted, list[Suspect]()
+    first = rest = float(e @ e)
+    for _ in range(LIKELY):
+        kinds = [_fastest(q, qd, e, x, cutoff) for x in (np.ones_like(e), predicted)]
+        of = int(np.argmax([score for score, _ in kinds]))
+        score, k = kinds[of]
+        p = 2 * len(WAVES) * float(np.exp(-score / 2))
+        wave = np.where(k * np.abs(qd) > 2 * np.pi * cutoff, predicted if of else 1.0, 0.0) * np.exp(1j * k * q)
+        stretches = np.array_split(np.flatnonzero(wave), STRETCHES)
+        if p > certain or len(stretches[-1]) < FEWEST:
+            break
+        sums = np.array([2 * np.sum(e[at] * wave[at]) for at in stretches])
+        sizes = np.array([np.sum(np.abs(wave[at]) ** 2) for at in stretches])
+        z, mean, others = sums / sizes, sums.sum() / sizes.sum(), (sums.sum() - sums) / (sizes.sum() - sizes)
+        if sizes @ np.abs(z - others) ** 2 > proof * (sizes @ np.abs(z) ** 2):
+            break
+        held_out = e.copy()
+        for at, other in zip(stretches, others, strict=True):
+            held_out[at] -= (other.conjugate() * wave[at]).real
+        before, rest = rest, float(held_out @ held_out)
+        errors = [100 * float(np.sqrt(x / max(measured @ measured, TINY))) for x in (before, rest)]
+        along = (z * mean.conjugate()).real / abs(mean)  # of the same phase
+        size, sigma = float(abs(mean)), float(np.std(along, ddof=1) / np.sqrt(len(z)))
+        place = (*(("cogging", "drive"), ("commutation", "drive"))[of], j, (size,), (sigma,), ("N m", "1")[of], p)
+        top = k / (2 * np.pi) * float(np.abs(qd).max())
+        found.append(Suspect(*place, size / sigma, (), (errors[0], errors[1]), score, setting=float(k), band=top))
+        e = e - (mean.conjugate() * wave).real
+    # White noise has a sixth of the squares of its second differences.
+    noise = float(np.sum(np.diff(e, 2) ** 2)) / 6
+    yield from found if rest - noise < proof * (first - noise) else ()
 
-    score: float
-    p: float
-    """Probability that any wave of the joint has this score by chance."""
-    k: int
-    """Waves a turn."""
-    top: float
-    """Its highest frequency [Hz]."""
-    units: list[Array]
-    """x exp(i k q) in each log, 0 within the band, shape (time,)."""
 
-    def suspect(self, j: int, of: int, z: Array, p: float, held_out: tuple[float, float]) -> Suspect:
-        """The ripple of a joint, by z of each stretch: cogging, or of the torque constant."""
-        cause, unit = (("cogging", "N m"), ("commutation", "1"))[of]
-        size, sigma = float(np.abs(z.mean())), float(np.std(np.abs(z), ddof=1) / np.sqrt(len(z)))
-        t = size / max(sigma, TINY)
-        return Suspect(
-            cause, "drive", j, (size,), (sigma,), unit, p, t, (), held_out, self.score, setting=float(self.k), band=self.top
-        )
-
-
-def _squares(e: Sequence[Array]) -> float:
-    """Sum of squares of a signal in all logs."""
-    return sum(float(np.sum(x**2)) for x in e)
-
-
-def _fastest(parts: Sequence[LogRows], j: int, e: Sequence[Array], sizes: Sequence[Array], cutoff: float) -> _FastWave:
-    """The wave that samples above the band have most of."""
-    each = zip(parts, e, sizes, strict=True)
-    scores = np.sum([_of_joint(part, j, x, size, (cutoff, np.inf)) for part, x, size in each], axis=0)
+def _fastest(q: Array, qd: Array, e: Array, size: Array, cutoff: float) -> tuple[float, int]:
+    """Score of the number of waves that samples above a band have most of, as chi squared, and that number."""
+    scores = _of_joint(q, qd, e, size, (cutoff, np.inf))
     usual = float(np.median(scores[scores > 0])) if scores.any() else TINY
-    score, k = 2 * np.log(2) * float(scores.max()) / usual, int(WAVES[scores.argmax()])
-    states = [part.signals.state for part in parts]
-    outside = [k * np.abs(state.qd[j]) >= 2 * np.pi * cutoff for state in states]
-    units = [at * x * np.exp(1j * k * s.q[j]) for at, x, s in zip(outside, sizes, states, strict=True)]
-    top = k / (2 * np.pi) * max(float(np.abs(state.qd[j]).max()) for state in states)
-    return _FastWave(score, 2 * len(WAVES) * float(np.exp(-score / 2)), k, top, units)
-
-
-def _by_stretch(e: Array, wave: Array) -> Array:
-    """z_b of each stretch of a log, shape (stretch,)."""
-    seen = np.flatnonzero(wave)
-    every = np.array_split(seen, STRETCHES) if len(seen) > STRETCHES else [seen]
-    return np.array([2 * np.sum(e[at] * wave[at]) / max(float(np.sum(np.abs(wave[at]) ** 2)), TINY) for at in every])
+    return 2 * np.log(2) * float(scores.max()) / usual, int(WAVES[scores.argmax()])
 
 
 def _scores(part: LogRows, e: Array, size: Array, cutoff: float) -> Array:
@@ -154,19 +137,20 @@ def _scores(part: LogRows, e: Array, size: Array, cutoff: float) -> Array:
     state, rows = part.signals.state, part.rows
     t, inside = np.arange(state.q.shape[-1]) / part.signals.fs, rows.maps[0].inside
     every = [np.interp(t, rows.time[rows.group == j], e[rows.group == j]) for j in range(len(size))]
-    return np.stack([_of_joint(part, j, x, inside[j] * size[j], (0.0, cutoff)) for j, x in enumerate(every)])
+    each = zip(state.q, state.qd, every, inside * size, strict=True)
+    return np.stack([_of_joint(q, qd, x, own, (0.0, cutoff)) for q, qd, x, own in each])
 
 
-def _of_joint(part: LogRows, j: int, e: Array, size: Array, band: tuple[float, float]) -> Array:
+def _of_joint(q: Array, qd: Array, e: Array, size: Array, band: tuple[float, float]) -> Array:
     """Score of each number of waves in a signal of one joint, of the instants at which it is in a band [Hz], shape (wave,)."""
-    state, (low, high) = part.signals.state, 2 * np.pi * np.array(band)
+    low, high = 2 * np.pi * np.array(band)
     # Of rows all instants count: what they have where a wave is above their band is none of its own.
     some = slice(None, None, max(1, len(e) // ENOUGH) if low else 1)
     left, squares, found = (e * size)[some], size[some] ** 2, np.zeros(len(WAVES))
-    phase, speed, every = np.exp(1j * state.q[j, some]), np.abs(state.qd[j, some]), np.sum(squares)
+    phase, speed, every = np.exp(1j * q[some]), np.abs(qd[some]), np.sum(squares)
     wave = phase ** WAVES[0]
     for i, k in enumerate(WAVES):
-        at = (k * speed >= low) & (k * speed < high)
+        at = (k * speed > low) & (k * speed < high) if low else k * speed < high
         seen = float(np.sum(squares[at]))
         if seen > SEEN * every:
             found[i] = np.abs((left * at if low else left) @ wave) ** 2 / seen

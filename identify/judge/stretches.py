@@ -62,7 +62,7 @@ def noise_errors(problem: Problem) -> Array:
 def left_unexplained(before: Array, after: Array, noise: Array) -> Array:
     """Share of the squared errors beyond noise that is left once something is mended, joint by joint; 1 where there were none.
 
-    Where less is left than the noise, that was too large, as a ripple of many waves counts as noise: the share is of all then.
+    Where errors are below the noise, that was too large, as a ripple of many waves counts as noise: the share is of all then.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def left_unexplained(before: Array, after: Array, noise: Array) -> Array:
     noise : Array, shape (joint,)
         What noise makes of them [%].
     """
-    beyond, rest = (np.maximum(x**2 - np.where(after < noise, 0.0, noise**2), 0.0) for x in (before, after))
+    beyond, rest = (np.maximum(x**2 - np.where(before <= noise, 0.0, noise**2), 0.0) for x in (before, after))
     return np.divide(rest, beyond, out=np.ones_like(rest), where=beyond > 0)
 
 

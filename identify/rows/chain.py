@@ -164,10 +164,5 @@ def poses_chain() -> Chain:
 CHAINS: Table[Chain] = Table(
     "chains",
     Chain,
-    {
-        "paper": paper_chain,
-        "paper_masked": paper_masked_chain,
-        "idbench": idbench_chain,
-        "unfiltered": unfiltered_chain,
-    },
+    {"paper": paper_chain, "paper_masked": paper_masked_chain, "idbench": idbench_chain, "unfiltered": unfiltered_chain},
 )

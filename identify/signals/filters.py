@@ -109,10 +109,7 @@ class AbstractDifferentiator(ABC):
         """Return dx/dt of `x`, shape (..., time), sampled at `fs` [Hz]."""
 
 
-_WEIGHTS = {
-    2: np.array([-1.0, 0.0, 1.0]) / 2,
-    6: np.array([-1.0, 9.0, -45.0, 0.0, 45.0, -9.0, 1.0]) / 60,
-}
+_WEIGHTS = {2: np.array([-1.0, 0.0, 1.0]) / 2, 6: np.array([-1.0, 9.0, -45.0, 0.0, 45.0, -9.0, 1.0]) / 60}
 """Weights that are exact for polynomials of degree 2 and 6."""
 
 
@@ -148,7 +145,5 @@ class CentralDifference(AbstractDifferentiator):
 DIFFERENTIATORS: Table[AbstractDifferentiator] = Table(
     "differentiators",
     AbstractDifferentiator,  # type: ignore[type-abstract]  # only asked whether an instance is one
-    {
-        "central": CentralDifference,
-    },
+    {"central": CentralDifference},
 )

@@ -139,8 +139,5 @@ def _samples(width: float) -> int:
 MASKS: Table[AbstractMask] = Table(
     "masks",
     AbstractMask,  # type: ignore[type-abstract]  # only asked whether an instance is one
-    {
-        "none": NoMask,
-        "reversal": ReversalMask,
-    },
+    {"none": NoMask, "reversal": ReversalMask},
 )

@@ -128,9 +128,5 @@ def _taps(cutoff: float, fs: float) -> Array:
 PREFILTERS: Table[AbstractPrefilter] = Table(
     "prefilters",
     AbstractPrefilter,  # type: ignore[type-abstract]  # only asked whether an instance is one
-    {
-        "none": NoPrefilter,
-        "butterworth": ButterworthPrefilter,
-        "noise": NoisePrefilter,
-    },
+    {"none": NoPrefilter, "butterworth": ButterworthPrefilter, "noise": NoisePrefilter},
 )

@@ -125,8 +125,5 @@ class AsLogged(AbstractAlignment):
 ALIGNMENTS: Table[AbstractAlignment] = Table(
     "alignments",
     AbstractAlignment,  # type: ignore[type-abstract]  # only asked whether an instance is one
-    {
-        "channel": ByChannel,
-        "logged": AsLogged,
-    },
+    {"channel": ByChannel, "logged": AsLogged},
 )

@@ -11,10 +11,5 @@ from idbench.sim.drives.switched_drive import SwitchedDrive as SwitchedDrive
 DRIVES: PluginTable[AbstractDrive] = PluginTable(
     "drives",
     AbstractDrive,  # type: ignore[type-abstract]  # only asked whether an instance is one
-    {
-        "ideal": IdealDrive,
-        "averaged": AveragedDrive,
-        "switched": SwitchedDrive,
-        "servo": ServoDrive,
-    },
+    {"ideal": IdealDrive, "averaged": AveragedDrive, "switched": SwitchedDrive, "servo": ServoDrive},
 )

@@ -70,11 +70,15 @@ def faulty(run: Run) -> Run:
         return run
     logs = list[MotionLog]()
     for i, seed in enumerate(run.seeds):
+        if i in run.failures:
+            logs.append(run.alone(i))
+            continue
         true = run.q[i], run.qd[i], np.gradient(run.qd[i], 1 / run.log.fs, axis=0)
         rng = np.random.default_rng([seed, FAULTS])
         logs.append(with_faults(run.robots[i], run.alone(i), true, run.scenario.faults, rng))
     q, tau = np.stack([log.q for log in logs]), np.stack([log.tau for log in logs])
-    return replace(run, log=replace(run.log, fs=logs[0].fs, q=q, tau=tau))
+    fs = next((log.fs for i, log in enumerate(logs) if i not in run.failures), run.log.fs)
+    return replace(run, log=replace(run.log, fs=fs, q=q, tau=tau))
 
 
 def ideal_log(robot: Robot, reference: Reference) -> MotionLog:

@@ -64,8 +64,15 @@ class Fault:
             )
         if self.end is not None and self.end <= self.start:
             raise ScenarioError(f"end = {self.end:g} s must be after start = {self.start:g} s")
+        if self.kind == "rate" and (self.start or self.end):
+            raise ScenarioError("start and end have no effect on a fault 'rate': the times of a log are one rate's")
         if self.kind in OF_PAIRS and not self.joint:
             raise ScenarioError(f"joint is missing: a fault {self.kind!r} is of a joint and the next")
+
+    def times(self, severity: float) -> "Fault":
+        """The same fault, so many times as large."""
+        size = 1 - severity * (1 - self.size) if self.kind == "saturation" else severity * self.size
+        return replace(self, size=size)
 
 
 @dataclass(eq=False)

@@ -1,6 +1,5 @@
 """Everything that defines a run, from TOML or Python."""
 
-from dataclasses import replace
 from typing import Annotated, Literal
 
 import numpy as np
@@ -14,7 +13,7 @@ from idbench.sim.errors import ScenarioError
 from idbench.sim.frictions import AbstractFrictionLaw, CoulombViscous
 from idbench.sim.robot.payload import Payload
 from idbench.sim.robot.robot import Robot
-from idbench.sim.scenario.faults import Fault
+from idbench.sim.scenario.faults import FAULTS, Fault
 from idbench.sim.scenario.measurement import Ripple, TorqueMeasurement
 from idbench.sim.settings import NotNegative, Number, Positive, Seed, settings
 from idbench.sim.trajectories import AbstractTrajectory, Quintic
@@ -90,7 +89,7 @@ class Scenario:
     fault: tuple[Fault, ...] = ()
     """What is wrong with the robot or its log, one [[fault]] after the other."""
     severity: Positive = 1.0
-    """By what the sizes of all faults are multiplied."""
+    """By what the sizes of all faults are multiplied; of saturation what is cut off."""
 
     def __post_init__(self) -> None:
         if self.drive.commands != self.controller.commanded:
@@ -100,12 +99,14 @@ class Scenario:
             )
         if self.drive.commands == "position" and self.torque.source == "reference":
             raise ScenarioError("the torque of a servo is commanded by nobody: torque.source must be 'current'")
+        if self.severity != 1 and not any(FAULTS[fault.kind].unit for fault in self.fault):
+            raise ScenarioError(f"severity = {self.severity:g} has no effect: no fault of the scenario has a size")
         _ = self.faults
 
     @property
     def faults(self) -> tuple[Fault, ...]:
         """The faults as large as they are."""
-        return tuple(replace(fault, size=self.severity * fault.size) for fault in self.fault)
+        return tuple(fault.times(self.severity) for fault in self.fault)
 
     @property
     def real_robot(self) -> Robot:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from idbench.identify import encoder_steps
-from idbench.identify.data.jumps import Velocities
+from idbench.identify.data.jumps import Velocities, dropouts, jumps
 
 T = np.arange(2000) / 100.0
 MOTION = np.stack([np.sin(T) + 0.1 * T, 0.3 * np.cos(2 * T)], axis=-1)
@@ -40,6 +40,17 @@ def test_one_small_difference_is_no_encoder():
 FAST = np.arange(0, 8, 1e-3)
 TRUE = np.stack([np.sin(1.3 * FAST) + 0.5 * np.sin(3 * FAST), np.cos(2 * FAST)], axis=1)
 SPEED = np.stack([1.3 * np.cos(1.3 * FAST) + 1.5 * np.cos(3 * FAST), -2 * np.sin(2 * FAST)], axis=1)
+
+
+def test_a_gap_of_all_joints_is_one_dropout_and_wild_samples_are_none():
+    t = np.arange(1000) / 100
+    q = np.sin(np.outer(t, [1.0, 1.3, 0.7, 1.7, 0.9, 1.1]))
+    gap = np.concatenate([q[:400], q[440:]])
+    wild = q.copy()
+    wild[100::150, 0] += 1.0
+    assert dropouts(jumps(gap, 100.0)) == 1
+    assert len(jumps(wild, 100.0)) >= 5
+    assert dropouts(jumps(wild, 100.0)) == 0
 
 
 def test_velocities_that_know_better_are_used(rng):

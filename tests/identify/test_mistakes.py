@@ -12,6 +12,7 @@ from idbench.identify.arrays import combined
 from idbench.identify.judge.diagnosis import diagnosed, dropped_samples
 from idbench.identify.judge.fitted_motion import FittedMotion
 from idbench.identify.judge.mistakes import OF_JOINTS, OF_ROBOT
+from idbench.identify.judge.stretches import left_unexplained
 from idbench.identify.judge.whole_mistakes import DECISIVE, _likely, _others
 from idbench.identify.signals.signals import State
 
@@ -178,3 +179,13 @@ def test_dropped_samples_are_one_cause_and_a_slip_is_none():
     assert dropped_samples([clean, slipped]) is None
     found = dropped_samples([clean, dropped])
     assert (found.cause, found.joint, found.log) == ("dropouts", None, 1)
+
+
+@pytest.mark.parametrize("before", [0.8, 1.0, 1.3, 2.5])
+def test_a_mend_that_leaves_less_is_never_worse(before):
+    """Whatever the noise, 1, is: also where it was taken for too large."""
+    after = np.linspace(0.0, before, 200)
+    shares = np.array([left_unexplained(np.array([before]), np.array([x]), np.ones(1))[0] for x in after])
+    assert (np.diff(shares) >= 0).all()
+    assert shares[0] == 0
+    assert shares[-1] == 1

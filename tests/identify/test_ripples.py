@@ -5,6 +5,7 @@ import pytest
 
 import idbench
 from idbench.identify import MotionLog, TorqueChannel
+from idbench.identify.judge.ripples import fast_ripples
 from idbench.sim import load_scenario, run
 
 ROTOR = """<mujoco><worldbody><body><joint name="shaft" axis="0 0 1"/><inertial pos="0 0 0" mass=".1"
@@ -77,3 +78,23 @@ def test_friction_auto_finds_the_cogging_that_a_scenario_has():
     for name in ("C36s1", "C36c1", "C28s2", "C28c2"):
         k = fit.basis.names.index(name)
         assert X[k] == pytest.approx(done.truth[name], abs=4 * sigma[k]), name
+
+
+def test_a_log_that_is_too_slow_for_a_wave_does_not_bias_its_size(rotor):
+    """42 waves are above the band in the first of three logs alone."""
+    fast, slow = log_of(lambda q: 0.03 * np.sin(42 * q)), log_of(lambda q: 0.03 * np.sin(42 * q), seed=1)
+    logs = [fast, *(MotionLog(FS, slow.q / 4, 0.01 * np.sign(slow.q - 1) + 0 * slow.tau, slow.torque) for _ in range(2))]
+    problem = idbench.fit([fast], rotor, armature="none").fit.problem
+    several = problem.with_logs(logs)
+    (found,) = fast_ripples(several, problem.factors.fit(2).X, 1e-6, 0.9)
+    assert found.setting == 42.0
+    assert found.size[0] == pytest.approx(0.03, rel=0.02)
+
+
+def test_half_of_what_is_left_beyond_noise_is_asked_also_of_fast_ripples(rotor):
+    """80 waves of 0.01 N m are 20 Hz; two hums that no wave explains have three times their squares."""
+    log = log_of(lambda q: 0.01 * np.sin(80 * q))
+    t = np.arange(log.samples) / FS
+    hum = 0.012 * np.sin(2 * np.pi * 9.3 * t) + 0.012 * np.sin(2 * np.pi * 13.1 * t + 1)
+    fit = idbench.fit(MotionLog(FS, log.q, log.tau + hum[:, None], log.torque), rotor, armature="none").fit
+    assert not ripples(fit)

@@ -11,11 +11,5 @@ from idbench.identify.rows.operators.windows import Windows as Windows
 OPERATORS: Table[AbstractOperator] = Table(
     "operators",
     AbstractOperator,  # type: ignore[type-abstract]  # only asked whether an instance is one
-    {
-        "fir": FirLowPass,
-        "iir": IirLowPass,
-        "windows": Windows,
-        "modulating": ModulatingFunctions,
-        "samples": Samples,
-    },
+    {"fir": FirLowPass, "iir": IirLowPass, "windows": Windows, "modulating": ModulatingFunctions, "samples": Samples},
 )
