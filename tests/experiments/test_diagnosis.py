@@ -57,6 +57,7 @@ def test_every_mistake_has_words():
         ("exchanged", "joint"),
         ("gravity", "base"),
         ("missing_torque", "torque"),
+        ("dropouts", "log"),
         ("unit", "position"),
         ("unit", "joint"),
         ("stated", "request"),
