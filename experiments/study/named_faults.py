@@ -34,7 +34,7 @@ def is_named(first: Suspect, joints: Sequence[str], faults: Sequence[Fault]) -> 
         if fault.kind in OF_PAIRS:
             names.add(joints[joints.index(fault.joint) + 1])
         # A base that is tilted a little has another gravity.
-        causes = {flaw.cause[0], *(("tilt",) if flaw.cause[0] == "gravity" else ())}
+        causes = {flaw.cause[0], " of the ".join(flaw.cause), *(("tilt",) if flaw.cause[0] == "gravity" else ())}
         of_same = first.of == flaw.cause[1]
         for cause, j in ((first.cause, first.joint),) * of_same + first.alternatives:
             if cause in causes and (flaw.whole or not fault.joint or (j is not None and joints[j] in names)):
