@@ -32,7 +32,7 @@ def is_named(first: Suspect, joints: Sequence[str], faults: Sequence[Fault]) -> 
     for fault in faults:
         flaw, names = FAULTS[fault.kind], {fault.joint}
         if fault.kind in OF_PAIRS:
-            names.add(joints[joints.index(fault.joint) + 1])
+            names.add(joints[(joints.index(fault.joint) + 1) % len(joints)])
         # A base that is tilted a little has another gravity.
         causes = {flaw.cause[0], " of the ".join(flaw.cause), *(("tilt",) if flaw.cause[0] == "gravity" else ())}
         of_same = first.of == flaw.cause[1]
