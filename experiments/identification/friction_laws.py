@@ -116,10 +116,12 @@ def _laws(text: str, laws: str) -> tuple[str, ...]:
         )
     if "none" in terms and len(terms) > 1:
         raise ExperimentError(f"--friction {text}: none is no friction at all: leave out none, or the others")
-    kinds = [term if term.startswith("cogging:") else term.partition(":")[0] for term in terms]
+    split = ((term.partition(":")[0], term) for term in terms)
+    # Laws that ask for a number are others with another.
+    kinds = [term if x in BLOCKS and getattr(BLOCKS.create(x), "asks", None) else x for x, term in split]
     if again := next((kind for kind in kinds if kind and kinds.count(kind) > 1), ""):
         raise ExperimentError(f"--friction {text}: {again} is given twice in the sum: leave one out")
-    found = tuple(dict.fromkeys(chain(*(GROUPS.get(name, (name,)) for name in laws.split("+")))))
+    found = tuple(dict.fromkeys(chain(*(GROUPS.get(name, (name,)) for name in terms))))
     for name in found:
         try:
             law_of(name)

@@ -50,12 +50,10 @@ def typical_figure(families: Mapping[str, Sequence[Cell]], axis: Axis, edges: in
 
 def named_figure(families: Mapping[str, Sequence[Cell]], axis: Axis) -> str:
     """Share of the runs whose fault is named as one picture, a row a family of cells, a column a value of an axis."""
-    at = {axis.label(value): k for k, value in enumerate(axis.points)}
-    shares = np.full((len(families), len(at)), np.nan)
-    for row, cells in zip(shares, families.values(), strict=True):
-        row[[at[cell.settings[axis.field]] for cell in cells]] = [100 * cell.named_share[0] for cell in cells]
-    columns = [in_words(label) for label in at]
-    return svg(matrix([*families], columns, shares, f"runs whose fault is named [%], by {axis.field}", log=False))
+    columns = [axis.label(value) for value in axis.points]
+    named = ({cell.settings[axis.field]: 100 * cell.named_share[0] for cell in cells} for cells in families.values())
+    shares = np.array([[row.get(column, np.nan) for column in columns] for row in named])
+    return svg(matrix([*families], list(map(in_words, columns)), shares, "runs whose fault is named [%]", log=False))
 
 
 def error_figure(cells: Sequence[Cell], axis: Axis) -> str:

@@ -21,7 +21,7 @@ def named_faults(method: Method, robot_model: RobotModel, log: MotionLog, faults
         causes = ()
     unknown = not causes or causes[0].suspect.cause == "unknown"
     right = is_named(causes[0].suspect, robot_model.robot.joints, faults) if causes and faults else unknown and not faults
-    return dict(zip(NAMED, (float(right), float(not right and not unknown)), strict=True))
+    return dict(zip(NAMED, map(float, (right, not right and not unknown)), strict=True))
 
 
 def is_named(first: Suspect, joints: Sequence[str], faults: Sequence[Fault]) -> bool:

@@ -119,10 +119,9 @@ def dropped_samples(logs: Sequence[MotionLog]) -> Suspect | None:
     for k, log in enumerate(logs):
         every = jumps(log.q, log.fs) if log.q.ndim == 2 and not log.poses else []
         if dropouts(every) >= DROPOUTS:
-            place, size = (every[0].sample / log.fs, k if len(logs) > 1 else None), float(dropouts(every))
-            return Suspect(
-                "dropouts", "log", None, (size,), (0.0,), "jumps", 0.0, np.inf, (), (0.0, 0.0), np.inf, 0.0, 0.0, *place
-            )
+            size, first = float(dropouts(every)), min(jump.sample for jump in every if not jump.back)
+            found = Suspect("dropouts", "log", None, (size,), (0.0,), "jumps", 0.0, np.inf, (), (0.0, 0.0), np.inf)
+            return replace(found, instant=first / log.fs, log=k if len(logs) > 1 else None)
     return None
 
 

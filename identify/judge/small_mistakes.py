@@ -35,7 +35,7 @@ PROOF, MOSTLY, LEFT = 0.5, 1 / 9, 10.0
 which it may leave if the error is still above so many per cent of the torque, as something else is wrong, too."""
 PUSHED = 0.02  # Torque of a push, over the rms of the joint's, above which it is one: less is what any model leaves somewhere
 ALIKE = 0.8  # Share of what a mistake explains that another one must explain to be its alternative
-NEARLY_ALL = 0.95  # Share of what the most likely one takes from which on a more common one is named before it
+NEARLY_ALL = 0.95  # Share of the gain of the most likely one from which on a more common one is named before it
 MOST = 3  # Mistakes that are looked for, one beside the other
 MEDIAN = 0.4549  # Of chi squared with one degree of freedom
 FEWEST, MANY = 2, 100_000  # Rows a parameter, and rows at most: hundreds of columns of as many take a GB

@@ -28,7 +28,7 @@ axis leaves tens."""
 RATES = (0.8, 0.9, 0.95, 1.05, 1.1, 1.25)  # Rates of the clock, over the stated one, that are tried where something is wrong
 RATE_STEP = 0.07  # How far from the best of them, as a share, a better one is looked for: as far as to the next
 NEARLY = 0.6  # Share of what a small mistake takes of the likelihood from which on a large one is its alternative
-NEARLY_ALL = 0.9  # Share of what the most likely mistake takes from which on another explains as much
+NEARLY_ALL = 0.9  # Share of the gain of the most likely mistake from which on another explains as much
 MIRRORED = 0.1  # Distance from -1 of a gain that is called a wrong sign alone
 MOST = 3  # Large mistakes that are tried on held-out stretches, the most likely first
 ENOUGH = 20.0  # Rows a parameter with which many mistakes are looked for before all of a log is asked
