@@ -1,31 +1,52 @@
-"""Functions as compiled code, kept for the next process: for loops in which a step needs the one before."""
+"""The compiled part of the package: loops in which a step needs the one before, in C."""
 
-from collections.abc import Callable
-from contextlib import suppress
+import ctypes
+import sys
 from functools import cache
 from pathlib import Path
 from typing import Any
 
-from numba import njit
+import numpy as np
+import numpy.typing as npt
 
+from idbench.identify.errors import IdentificationError
 
-def compiled(function: Callable[..., Any]) -> Any:
-    """Return a function as compiled code, kept where there is a place for it; with the same arithmetic as Python."""
-    _remove_stale(Path(function.__code__.co_filename).parent)
-    try:
-        return njit(cache=True, nogil=True)(function)
-    except RuntimeError:  # neither the project's folder nor a cache of the user can be written
-        return njit(nogil=True)(function)
+SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
 
 
 @cache
-def _remove_stale(folder: Path) -> None:
-    """Remove compiled code of a folder that is older than any of its sources: what it takes may be defined in another one.
+def library() -> ctypes.CDLL:
+    """The compiled functions.
 
-    Of an earlier version numba cannot even read the index.
+    Raises
+    ------
+    IdentificationError
+        If this installation has none for this platform.
     """
-    with suppress(OSError):  # a folder that cannot be written: nothing was kept there
-        newest = max(path.stat().st_mtime for path in folder.glob("*.py"))
-        for path in (folder / "__pycache__").glob("*.nb?"):
-            if path.stat().st_mtime < newest:
-                path.unlink()
+    package = sys.modules[__name__.partition(".")[0]]
+    path = Path(str(package.__file__)).with_name("compiled" + SUFFIX)
+    try:
+        return ctypes.CDLL(str(path))
+    except OSError as error:
+        raise IdentificationError(
+            f"idbench has no compiled code for this platform ({error}): install it from its sources, which needs no compiler: "
+            "pip install --force-reinstall --no-binary idbench idbench, or, in a clone, uv sync --reinstall-package idbench"
+        ) from error
+
+
+def function(name: str, *arguments: Any, result: Any = None) -> Any:
+    """A compiled function with the types of its arguments and its result."""
+    found = library()[name]  # its own each time: types are not shared
+    found.argtypes, found.restype = arguments, result
+    return found
+
+
+def pointer(array: npt.NDArray[Any] | None) -> int | None:
+    """Address of the first number of a contiguous array; the array must outlive its use."""
+    if array is not None and not array.flags.c_contiguous:
+        raise AssertionError("compiled code takes contiguous arrays")
+    return None if array is None else array.ctypes.data
+
+
+Numbers = np.ctypeslib.ndpointer(np.float64, flags="C_CONTIGUOUS")
+"""An argument that is an array of numbers."""

@@ -1,18 +1,22 @@
 """Controllers, and their table."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import ClassVar
 
+import mujoco
 import numpy as np
 import numpy.typing as npt
 
+from idbench.identify.compiled import pointer
 from idbench.identify.plugins import PluginTable
-from idbench.sim.drives.drive import Commanded, every
+from idbench.sim.drives.drive import Commanded
+from idbench.sim.part import AbstractCompiledPart, mujoco_function
 from idbench.sim.robot.inverse_dynamics import InverseDynamics, inverse_dynamics
 from idbench.sim.robot.motors import Array
 from idbench.sim.robot.robot import Robot
+from idbench.sim.robot.varied import varied_models
 from idbench.sim.settings import EachPositive, Number, Positive, per_joint, settings
 from idbench.sim.trajectories import Reference
 
@@ -129,19 +133,9 @@ class PDFeedforward(AbstractClosedLoop):
 
     def start(self, task: Task) -> AbstractLaw:
         """Return the law, its gains for the inertia at the start of the motion."""
-        return _PDLaw(self, task)
-
-
-class _PDLaw(AbstractLaw):
-    def __init__(self, settings: PDFeedforward, task: Task) -> None:
-        w = per_joint(settings.bandwidth, task.nominal.n, "controller.bandwidth")
-        self._kp, self._kd = task.inertia * w**2, task.inertia * 2 * settings.damping * w
-        self._ahead = settings.feedforward * task.feedforward
-        self._error = Error(task.reference, task.nsim, settings.cutoff)
-
-    def command(self, k: int, q: Array) -> Array:
-        e, rate = self._error.update(k, q)
-        return self._ahead[k] + self._kp * e + self._kd * rate
+        w = per_joint(self.bandwidth, task.nominal.n, "controller.bandwidth")
+        M, ahead = task.inertia, self.feedforward * task.feedforward
+        return _law("pd_feedforward", task, M * w**2, M * 2 * self.damping * w, self.cutoff, signals=(ahead,))
 
 
 @settings
@@ -155,24 +149,10 @@ class PID(AbstractClosedLoop):
 
     def start(self, task: Task) -> AbstractLaw:
         """Return the law, its gains for the inertia at the start of the motion."""
-        return _PIDLaw(self, task)
-
-
-class _PIDLaw(AbstractLaw):
-    def __init__(self, settings: PID, task: Task) -> None:
-        w, M = per_joint(settings.bandwidth, task.nominal.n, "controller.bandwidth"), task.inertia
-        self._kp = 3 * M * w**2
-        self._kd = 3 * M * w
-        self._ki = M * w**3 / task.reference.fs
-        self._sum = np.zeros((task.nsim, task.nominal.n))
-        self._error = Error(task.reference, task.nsim, settings.cutoff)
-        # What holds the arm at rest, which the integrator would have found before the motion begins.
-        self._hold = task.feedforward[0]
-
-    def command(self, k: int, q: Array) -> Array:
-        e, rate = self._error.update(k, q)
-        self._sum = self._sum + e
-        return self._hold + self._kp * e + self._kd * rate + self._ki * self._sum
+        w, M = per_joint(self.bandwidth, task.nominal.n, "controller.bandwidth"), task.inertia
+        # What holds the arm at rest is what the integrator would have found before the motion begins.
+        others = M * w**3 / task.reference.fs, task.feedforward[0], 0.0
+        return _law("pid", task, 3 * M * w**2, 3 * M * w, self.cutoff, *others)
 
 
 @settings
@@ -190,22 +170,30 @@ class ComputedTorque(AbstractClosedLoop):
 
     def start(self, task: Task) -> AbstractLaw:
         """Return the law."""
-        return _ComputedTorqueLaw(self, task)
+        w, planned = per_joint(self.bandwidth, task.nominal.n, "controller.bandwidth"), task.reference
+        robots = NominalRobots(task)
+        gains = w**2, 2 * self.damping * w, self.cutoff, 1 + self.model_error
+        law = _law("computed_torque", task, *gains, signals=(planned.qd, planned.qdd), objects=robots.addresses)
+        law.robots = robots
+        return law
 
 
-class _ComputedTorqueLaw(AbstractLaw):
-    def __init__(self, settings: ComputedTorque, task: Task) -> None:
-        w = per_joint(settings.bandwidth, task.nominal.n, "controller.bandwidth")
-        self._kp = w**2
-        self._kd = 2 * settings.damping * w
-        self._share = 1 + settings.model_error
-        self._reference, self._model = task.reference, task.model
-        self._error = Error(task.reference, task.nsim, settings.cutoff)
+class NominalRobots:
+    """The nominal robot of every simulation in MuJoCo, as C takes it."""
 
-    def command(self, k: int, q: Array) -> Array:
-        e, rate = self._error.update(k, q)
-        qdd = self._reference.qdd[k] + self._kp * e + self._kd * rate
-        return self._share * self._model(q, self._reference.qd[k] - rate, qdd)
+    def __init__(self, task: Task) -> None:
+        self.models = varied_models(task.nominal, task.nsim, task.vary)
+        self.datas = [mujoco.MjData(model) for model in self.models]
+
+    @property
+    def addresses(self) -> list[list[int]]:
+        """Functions, structures and arrays, in the order of controllers.c."""
+        functions = [mujoco_function(name) for name in ("mj_fwdPosition", "mj_fwdVelocity")]
+        return [
+            [*functions, m._address, d._address]
+            + [pointer(x) or 0 for x in (d.qpos, d.qvel, d.M, d.qfrc_bias, d.qfrc_passive, m.M_rownnz, m.M_colind)]
+            for m, d in zip(self.models, self.datas, strict=True)
+        ]
 
 
 @settings
@@ -216,16 +204,40 @@ class PositionCommand(AbstractController):
 
     def start(self, task: Task) -> AbstractLaw:
         """Return the commands of a motion."""
-        return _PositionLaw(task)
+        return CompiledLaw("position_command", (task.nsim, task.nominal.n), (), signals=(_of_each(task.reference.q),))
 
 
-class _PositionLaw(AbstractLaw):
-    def __init__(self, task: Task) -> None:
-        planned = task.reference.q
-        self._planned = planned if planned.ndim == 3 else [every(q, task.nsim) for q in planned]
+class CompiledLaw(AbstractCompiledPart, AbstractLaw):
+    """A controller in C."""
+
+    robots: NominalRobots | None = None
+    """What it knows of the robots, if it asks MuJoCo."""
 
     def command(self, k: int, q: Array) -> Array:
-        return self._planned[k]
+        """Command of a sample, as in the loop."""
+        return self.call_sampled(k, q)
+
+
+def _law(
+    name: str,
+    task: Task,
+    kp: Array,
+    kd: Array,
+    cutoff: float,
+    *others: npt.ArrayLike,
+    signals: Sequence[Array] = (),
+    objects: Sequence[Sequence[int]] = (),
+) -> CompiledLaw:
+    """Return a law of the control error and its rate behind a low-pass [Hz]."""
+    fs = task.reference.fs
+    rows = kp, kd, 1 - np.exp(-2 * np.pi * cutoff / fs), fs, 0.0, 0.0, *others
+    each = [_of_each(x) for x in (task.reference.q, *signals)]
+    return CompiledLaw(name, (task.nsim, task.nominal.n), rows, signals=each, objects=objects)
+
+
+def _of_each(signal: Array) -> Array:
+    """Return a signal of all simulations, shape (time, joint), or of each, (time, nsim, joint), by simulation."""
+    return signal[None] if signal.ndim == 2 else signal.swapaxes(0, 1)
 
 
 CONTROLLERS: PluginTable[AbstractController] = PluginTable(

@@ -8,6 +8,7 @@ import numpy as np
 
 from idbench.identify.plugins import PluginTable
 from idbench.sim.errors import ScenarioError
+from idbench.sim.part import AbstractCompiledPart
 from idbench.sim.robot.motors import Array
 from idbench.sim.settings import EachCount, NotNegative, Share, per_joint, settings
 
@@ -54,16 +55,11 @@ class ExactEncoder(AbstractEncoder):
 
     def start(self, n: int, samples: int, fs: float, rngs: Sequence[np.random.Generator]) -> AbstractReader:
         """Return the encoder."""
-        return _ExactReader()
+        return CompiledReader("exact_encoder", (len(rngs), n), ())
 
     def spread(self, n: int) -> Array:
         """Return zeros."""
         return np.zeros(n)
-
-
-class _ExactReader(AbstractReader):
-    def read(self, k: int, q: Array) -> Array:
-        return q.copy()
 
 
 @settings
@@ -87,12 +83,14 @@ class IncrementalEncoder(AbstractEncoder):
         """Return the encoders, their random events drawn."""
         if self.missed_counts > fs:
             raise ScenarioError(f"encoder.missed_counts = {self.missed_counts:g} 1/s must be at most fs = {fs:g} Hz")
-        noise = missed = np.zeros((samples, 1, 1))
+        noise = missed = None
         if self.noise or self.missed_counts:
-            noise = np.stack([self.noise * rng.standard_normal((samples, n)) for rng in rngs], axis=1)
+            noise = np.stack([self.noise * rng.standard_normal((samples, n)) for rng in rngs])
         if self.missed_counts:
-            missed = np.stack([(rng.random((samples, n)) < self.missed_counts / fs).astype(np.float64) for rng in rngs], axis=1)
-        return _Reader(self, per_joint(self.lines, n, "encoder.lines"), noise, missed)
+            missed = np.stack([(rng.random((samples, n)) < self.missed_counts / fs).astype(np.float64) for rng in rngs])
+        counts = per_joint(self.lines, n, "encoder.lines") * self.quadrature / (2 * np.pi)
+        rows = counts, self.offset, self.quadrature, self.interpolation_error, 0.0, 0.0
+        return CompiledReader("incremental_encoder", (len(rngs), n), rows, signals=(noise if self.noise else None, missed))
 
     def spread(self, n: int) -> Array:
         """Standard deviation of counts (step / sqrt(12)), noise and interpolation error together."""
@@ -100,30 +98,12 @@ class IncrementalEncoder(AbstractEncoder):
         return np.sqrt((period / self.quadrature) ** 2 / 12 + self.noise**2 + (self.interpolation_error * period) ** 2 / 2)
 
 
-class _Reader(AbstractReader):
-    def __init__(self, settings: IncrementalEncoder, lines: Array, noise: Array, missed: Array) -> None:
-        self._settings = settings
-        self._noise = noise
-        self._missed = missed
-        self._counts_per_rad = lines * settings.quadrature / (2 * np.pi)
-        self._before: Array | None = None
-        self._lost = np.zeros(noise.shape[1:])
+class CompiledReader(AbstractCompiledPart, AbstractReader):
+    """An encoder in C."""
 
     def read(self, k: int, q: Array) -> Array:
-        counts = self._count(q + self._noise[k] if self._settings.noise else q)
-        if not self._settings.missed_counts:
-            return counts / self._counts_per_rad
-        if self._before is not None:
-            self._lost = self._lost + np.sign(counts - self._before) * self._missed[k]
-        self._before = counts
-        return (counts - self._lost) / self._counts_per_rad
-
-    def _count(self, q: Array) -> Array:
-        period, error = self._settings.quadrature, self._settings.interpolation_error
-        x = q * self._counts_per_rad
-        if error:
-            x = x + period * error * np.sin(2 * np.pi / period * x)
-        return np.floor(x + self._settings.offset)
+        """Measured positions [rad], as in the loop."""
+        return self.call_sampled(k, q)
 
 
 ENCODERS: PluginTable[AbstractEncoder] = PluginTable(

@@ -6,6 +6,7 @@ import numpy as np
 
 from idbench.experiments.contracts.contract import FS, RUNS, Example, require, require_equal
 from idbench.sim.controllers import Task
+from idbench.sim.engine.failures import Bounds
 from idbench.sim.engine.plant import Plant
 from idbench.sim.robot.robot import Robot
 from idbench.sim.scenario.scenario import Physics
@@ -48,8 +49,9 @@ def encoder_reads_to_a_count(encoder: Any, _: Example) -> None:
 
 def friction_resists(law: Any, example: Example) -> None:
     """What it adds to MuJoCo's own friction opposes the motion."""
-    plant, qd = Plant(example.robot, 1, Physics(), STEP, {}, 1), np.array([[1.0, -1.0]])
-    contact = law.start(plant.batch, np.array([[0.5, 0.1]]), STEP)
+    bounds = Bounds(example.robot, example.reference, 1)
+    plant, qd = Plant([example.robot.model], Physics(), STEP, bounds), np.array([[1.0, -1.0]])
+    contact = law.start(plant, np.array([[0.5, 0.1]]), STEP)
     for _ in range(50):
         torque = np.asarray(contact.torque(qd))
     require((torque * qd <= 0).all(), f"at velocities of {qd[0]} rad/s it drives with {torque.ravel()} N m")

@@ -1,15 +1,10 @@
 """Servos as files: a function in Python, and the robot's MJCF, measured in plain MuJoCo."""
 
-import ast
-import inspect
-import re
 from collections.abc import Iterable, Mapping, Sequence
 from importlib.metadata import version
 from importlib.resources import files
 from pathlib import Path
 from pprint import pformat
-from textwrap import dedent, indent
-from typing import Any
 
 import numpy as np
 
@@ -25,19 +20,10 @@ def servo_function(robot: str, fits: Mapping[str, tuple[Servo, ServoFit]], logs:
     text = files("idbench.experiments.exports").joinpath("servo.py.txt").read_text(encoding="utf-8")
     every = {joint: _parameters(servo, fit) for joint, (servo, fit) in fits.items()}
     table = pformat(every, width=110, sort_dicts=False).replace("inf", 'float("inf")')
-    words = {"friction": _friction_lines(), "name": robot, "version": version("idbench"), "logs": ", ".join(logs)}
+    words = {"name": robot, "version": version("idbench"), "logs": ", ".join(logs)}
     for mark, word in {**words, "servos": table}.items():
         text = text.replace(f"{{{mark}}}", word)
     return text
-
-
-def _friction_lines() -> str:
-    """Lines of the compiled friction as plain Python, the parameters `p` a table."""
-    from idbench.identify.servo.servo_step import friction
-
-    lines: Any = ast.parse(dedent(inspect.getsource(friction.py_func))).body[0]
-    code = re.sub(r"\bp\.(\w+)", r'p["\1"]', "\n".join(ast.unparse(line) for line in lines.body[1:]))
-    return indent(code.replace("return ", 'return p["Fo"] * (not on) + '), 8 * " ")
 
 
 def _parameters(servo: Servo, fit: ServoFit) -> dict[str, float]:

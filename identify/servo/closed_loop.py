@@ -3,12 +3,15 @@
 import os
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import NamedTuple
+from ctypes import c_double, c_int64, c_void_p
+from functools import cache
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from idbench.identify.arrays import Array
+from idbench.identify.compiled import function, pointer
 from idbench.identify.servo.parameters import SERVO_PARAMETERS, ServoLaw
 from idbench.identify.servo.run import ServoRun
 
@@ -34,7 +37,7 @@ WAY = 6  # Ranges of its motion that a joint may cross in a step: beyond, it is 
 
 
 class ServoLoop:
-    """Runs of one kind of servo, to be simulated with any parameters (see `idbench.identify.servo.servo_step`).
+    """Runs of one kind of servo, to be simulated with any parameters (see servo.c beside this).
 
     Steps are at most `step` [s]. Positions at rest are rounded to multiples of `count` [rad], as the servo reports them; 0:
     none are (see `count_of`).
@@ -74,39 +77,60 @@ class ServoLoop:
         """
         lanes = max(np.size(x) for x in p.values())
         every = {name: np.broadcast_to(np.asarray(x, dtype=np.float64), (lanes,)).tolist() for name, x in p.items()}
-        laws = [ServoLaw(**{name: x[lane] for name, x in every.items()}) for lane in range(lanes)]
+        laws = np.array([ServoLaw(**{name: x[lane] for name, x in every.items()}) for lane in range(lanes)])
         begins = np.broadcast_to(np.asarray(ahead, dtype=np.float64), (lanes, len(self.runs), STATES))
         out = np.empty((lanes, *self.q.shape))
         with ThreadPoolExecutor(os.cpu_count()) as pool:  # compiled code runs beside Python
             list(pool.map(lambda k: self._simulate_run(k, laws, begins[:, k], out[:, k]), range(len(self.runs))))
         return out
 
-    def _simulate_run(self, k: int, laws: Sequence[ServoLaw], ahead: Array, out: Array) -> None:
+    def _simulate_run(self, k: int, laws: Array, ahead: Array, out: Array) -> None:
         """Write the positions of a run into `out`, shape (lane, sample)."""
-        # Its compiler takes longer than many a command.
-        from idbench.identify.servo.servo_step import Firmware, at_samples, motion
-
-        run, begin = self.runs[k], self._begin[k]
-        starts = begin.state + ahead * begin.per_angle
-        servo = run.servo
+        run, begin, track = self.runs[k], self._begin[k], self._tracks[k]
+        servo, n = run.servo, len(track[0])
+        starts = np.ascontiguousarray(begin.state + ahead * begin.per_angle)
         steps = (run.t - run.t[0]) / self.h
         before = steps.astype(np.int64)  # each sample
-        firmware = Firmware(servo.slope, servo.kd, servo.limit, servo.speed_limit, servo.count, servo.steps)
-        for lane, (law, start) in enumerate(zip(laws, starts.tolist(), strict=True)):
-            path = motion(law, firmware, self._tracks[k], tuple(start), self.h, self._fastest)
-            out[lane, : len(before)] = at_samples(path, before, steps - before, self.count)
+        firmware = np.array([servo.slope, servo.kd, servo.limit, servo.speed_limit, servo.count, *servo.steps])
+        signals = np.array([pointer(x) for x in track], dtype=np.uint64)
+        lanes = np.array([pointer(lane) for lane in out], dtype=np.uint64)
+        share, work = steps - before, np.empty(2 * n)
+        moved = *map(pointer, (firmware, signals)), n, self.h, self._fastest, *map(pointer, (before, share)), len(before)
+        _lanes()(pointer(laws), pointer(starts), len(laws), *moved, self.count, pointer(work), pointer(lanes))
         out[:, len(before) :] = out[:, len(before) - 1 : len(before)]
 
     def _track(self, run: ServoRun) -> tuple[Array, ...]:
-        from idbench.identify.servo.servo_step import Track
-
+        """Command, voltage, share of the step with torque on, and load at each step, in the order of servo.c."""
         t = np.arange(int(np.ceil((run.t[-1] - run.t[0]) / self.h)) + 2) * self.h
         place = np.maximum(np.searchsorted(run.t - run.t[0], t + 1e-9, side="right") - 1, 0)
         on = run.enabled[place].astype(np.float64)
         voltage = np.full(len(t), run.servo.supply) if run.voltage is None else run.voltage[place]
         forward = np.zeros(len(t)) if run.forward is None else run.forward[place]
-        load = (np.ascontiguousarray(x) for x in run.load.over(np.minimum(run.t[0] + t, run.t[-1])))
-        return Track(run.command[place], forward, _centred(voltage * on), _centred(on), *load)
+        load = run.load.over(np.minimum(run.t[0] + t, run.t[-1]))
+        signals = run.command[place], forward, _centred(voltage * on), _centred(on), *load
+        return tuple(np.ascontiguousarray(x, dtype=np.float64) for x in signals)
+
+
+@cache
+def _lanes() -> Any:
+    """Compiled simulation of many laws of a run."""
+    P, I, D = c_void_p, c_int64, c_double  # noqa: E741
+    return function("servo_lanes", P, P, I, P, P, I, D, D, P, P, I, D, P, P)
+
+
+def targets(command: Array, rate: float, h: float) -> Array:
+    """Mean over each step h [s] of what follows a command within a rate [rad/s]."""
+    command = np.ascontiguousarray(command, dtype=np.float64)
+    means = np.empty_like(command)
+    run = function("servo_targets", c_void_p, c_int64, *[c_double] * 4, c_void_p)
+    run(pointer(command), len(command), rate, h, 0.0, 0.0, pointer(means))
+    return means
+
+
+def friction(p: ServoLaw, speed: float, motor: float, external: float, sent: float) -> float:
+    """Torque by which friction can resist at most [N m], for torques of motor and load, and what the gear transmits."""
+    run = function("servo_friction", c_void_p, *[c_double] * 4, result=c_double)
+    return float(run(pointer(np.array(p)), speed, motor, external, sent))
 
 
 def count_of(runs: Sequence[ServoRun]) -> float:

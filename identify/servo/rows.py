@@ -7,6 +7,7 @@ import numpy as np
 from scipy.signal import butter
 
 from idbench.identify.arrays import Array
+from idbench.identify.servo.closed_loop import targets
 from idbench.identify.servo.run import ServoRun
 from idbench.identify.signals.filters import forward_backward
 
@@ -129,8 +130,6 @@ class _Uniform:
 
     def driven(self, rate: float) -> Array:
         """Columns of a and of the offset for each delay, shape (time, delay, 2)."""
-        from idbench.identify.servo.servo_step import targets
-
         run, servo = self.run, self.run.servo
         target = targets(np.interp(self._t, run.t, run.command), rate, self.T)
         late = np.interp(self._t[:, None] - DELAYS, self._t, target)

@@ -6,6 +6,7 @@ from typing import ClassVar, Literal, NamedTuple
 import mujoco
 import numpy as np
 
+from idbench.sim.part import AbstractCompiledPart
 from idbench.sim.robot.motors import Array
 from idbench.sim.robot.robot import Robot
 
@@ -100,6 +101,25 @@ class AbstractAmplifier(ABC):
         return None
 
 
+class AbstractCompiledAmplifier(AbstractCompiledPart, AbstractAmplifier):
+    """A drive in C, which leaves signals of its own as a trace."""
+
+    signals: ClassVar[int] = 0
+    """How many, in the order of its function."""
+
+    _q: Array | float = 0.0
+
+    def sees(self, q: Array) -> None:
+        """Receive positions."""
+        self._q = q
+
+    def step(self, demand: Array, speed: Array, steps: int) -> Array:
+        """Advance as the loop does."""
+        tau, trace = self.call_drive(demand, np.asarray(self._q), speed, steps, self.signals)
+        self.trace = tuple(trace)
+        return tau
+
+
 class AbstractDrive(ABC):
     """The settings of a drive."""
 
@@ -155,8 +175,3 @@ class AbstractDrive(ABC):
     def step_length(self, fs: float, longest: float) -> float:
         """Return the physics step [s] that fits whole times into a sample of 1/`fs` and is not above `longest`."""
         return 1 / fs / max(1, int(np.ceil(1 / fs / longest - 1e-9)))
-
-
-def every(values: Array, nsim: int) -> Array:
-    """Return the values of the joints for every simulation, shape (nsim, joint): NumPy is slow where it must broadcast."""
-    return np.array(np.broadcast_to(values, (nsim, *values.shape)))

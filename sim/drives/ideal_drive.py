@@ -4,7 +4,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from idbench.sim.drives.drive import AbstractAmplifier, AbstractDrive, Electric, Trace
+from idbench.sim.drives.drive import AbstractAmplifier, AbstractCompiledAmplifier, AbstractDrive, Electric, Trace
 from idbench.sim.robot.motors import Array
 from idbench.sim.robot.robot import Robot
 from idbench.sim.settings import settings
@@ -19,16 +19,13 @@ class IdealDrive(AbstractDrive):
 
     def start(self, robot: Robot, nsim: int, h: float) -> AbstractAmplifier:
         """Return the drive."""
-        return _Amplifier()
+        return _Amplifier("ideal_drive", (nsim, robot.n), ())
 
     def lag(self, robot: Robot) -> Array:
         """Return zeros."""
         return np.zeros(robot.n)
 
 
-class _Amplifier(AbstractAmplifier):
-    def step(self, demand: Array, speed: Array, steps: int) -> Array:
-        return demand[None]
-
+class _Amplifier(AbstractCompiledAmplifier):
     def electric(self, trace: Trace, dt: Array) -> Electric:
         return Electric(*np.zeros((6, *dt.shape)))

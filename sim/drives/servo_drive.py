@@ -6,8 +6,7 @@ import mujoco
 import numpy as np
 from pydantic import Field
 
-from idbench.sim.drives.drive import AbstractAmplifier, AbstractDrive, Commanded, Electric, Trace, every
-from idbench.sim.drives.pwm import Profile, within
+from idbench.sim.drives.drive import AbstractAmplifier, AbstractCompiledAmplifier, AbstractDrive, Commanded, Electric, Trace
 from idbench.sim.errors import ScenarioError
 from idbench.sim.robot.motors import Array
 from idbench.sim.robot.robot import Robot
@@ -80,7 +79,17 @@ class ServoDrive(AbstractDrive):
 
     def start(self, robot: Robot, nsim: int, h: float) -> AbstractAmplifier:
         """Return the servos, which hold where they are."""
-        return _Amplifier(self, robot.n, nsim, h)
+        n, off = robot.n, np.array(self.off, dtype=np.float64)
+
+        def each(name: str, values: tuple[float, ...] | None) -> Array:
+            return per_joint(values or (np.inf,), n, f"drive.{name}")
+
+        names = "torque_constant", "resistance", "kp", "current_limit"
+        K, R, kp, most = (each(name, getattr(self, name)) for name in names)
+        step = 2 * np.pi / self.counts if self.counts else 0.0
+        firmware = self.rate or np.inf, self.acceleration or np.inf, self.lead, self.dead_band, self.duty_limit
+        rows = K, R, self.gain * kp, most, *firmware, self.supply, step, self.winding == "shorted", len(off), np.nan, 0.0, h / 2
+        return _Amplifier("servo_drive", (nsim, n), rows, h, signals=(off[None] if self.off else None,))
 
     def edit(self, spec: mujoco.MjSpec) -> None:
         """Write the armature into the joints, and make their friction as sharp as the step allows."""
@@ -115,48 +124,10 @@ class ServoDrive(AbstractDrive):
         return off
 
 
-class _Amplifier(AbstractAmplifier):
-    def __init__(self, settings: ServoDrive, n: int, nsim: int, h: float) -> None:
-        def each(values: tuple[float, ...], name: str) -> Array:
-            return every(per_joint(values, n, f"drive.{name}"), nsim)
+class _Amplifier(AbstractCompiledAmplifier):
+    """Its firmware runs in every physics step."""
 
-        self._settings = settings
-        self._h = h
-        self._t = h / 2  # in the middle of the step to come
-        self._K, self._R = each(settings.torque_constant, "torque_constant"), each(settings.resistance, "resistance")
-        self._gain = settings.gain * each(settings.kp, "kp")
-        self._most = each(settings.current_limit or (np.inf,), "current_limit")
-        self._target = Profile(settings.rate or np.inf, settings.acceleration or np.inf, h)
-        self._q: Array = np.zeros((1, nsim, n))
-
-    def sees(self, q: Array) -> None:
-        self._q = q
-
-    def step(self, demand: Array, speed: Array, steps: int) -> Array:
-        done = [self._once(demand, self._q[k % len(self._q)], speed[k % len(speed)]) for k in range(steps)]
-        # Most calls are of one step, where a view does.
-        self.trace = tuple(x[0][None] if steps == 1 else np.stack(x) for x in zip(*done, strict=True))
-        return self._K * self.trace[1]
-
-    def _once(self, command: Array, q: Array, qd: Array) -> tuple[Array, ...]:
-        """Return duty, current, back-EMF and whether a limit holds, in one step."""
-        s = self._settings
-        target = self._target.follow(command)
-        on = not s.is_off(self._t)
-        self._t += self._h
-        step = 2 * np.pi / s.counts if s.counts else 0.0
-        seen = np.rint(q / step) * step if step else q
-        error = target - seen - s.lead * qd
-        if s.dead_band:
-            error = error - within(error, s.dead_band)
-        asked = self._gain * error * on
-        duty = within(asked, s.duty_limit)
-        emf = self._K * qd
-        driven = on or s.winding == "shorted"
-        wanted = driven * (s.supply * duty - emf) / self._R
-        current = within(wanted, self._most)
-        limited = (np.abs(asked) > s.duty_limit) | (np.abs(wanted) > self._most)
-        return duty, current, emf, limited.astype(np.float64), self._R * current + emf
+    signals: ClassVar[int] = 5
 
     def electric(self, trace: Trace, dt: Array) -> Electric:
         duty, current, emf, limited, voltage = trace

@@ -1,97 +1,21 @@
 """A DC motor behind an H-bridge chopper, the winding resolved between the edges of the pulses."""
 
-from dataclasses import dataclass
-from functools import cached_property
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
 from pydantic import Field
 
+from idbench.identify.compiled import pointer
 from idbench.sim.drives.averaged_drive import limits
-from idbench.sim.drives.drive import AbstractAmplifier, AbstractDrive, BetweenEdges, Electric, Trace, every
-from idbench.sim.drives.pwm import Modulation, Modulator, pieces, within
-from idbench.sim.drives.winding import Loops, PeriodTable, Winding, Windings, pass_period, straight, stretches
+from idbench.sim.drives.drive import AbstractAmplifier, AbstractCompiledAmplifier, AbstractDrive, BetweenEdges, Electric, Trace
+from idbench.sim.drives.pwm import Modulation, Modulator, pieces
+from idbench.sim.drives.winding import Winding, pass_period, straight, stretches
 from idbench.sim.errors import ScenarioError
 from idbench.sim.robot.motors import Array, Motors
 from idbench.sim.robot.robot import Robot
 from idbench.sim.settings import EachPositiveOrNone, NotNegative, Number, Positive, Share, settings
 
 MAX_VALUES = 20_000  # Values of the modulation index beyond which no table is made
-
-
-@dataclass(frozen=True, eq=False)
-class ExactPassages:
-    """Passages computed period by period, for any modulation index."""
-
-    winding: Winding
-    """Shape (sim, joint)."""
-    modulator: Modulator
-    """Its chopper."""
-
-    least: float = 0.0
-    """Step of the modulation index, 0 if it has none."""
-
-    def advance(self, loops: Loops, windings: Windings, wanted: Array, emf: Array) -> Array:
-        """Advance windings by PWM periods, in arrays over windings; arguments and what is returned as for `periods`."""
-        done = np.empty((4, *emf.shape))
-        charge, before, after, index = done
-        for k, e in enumerate(emf):
-            error = wanted - windings.i
-            asked = loops.kp * error + windings.sum + loops.known * e
-            v = within(asked, loops.most)
-            windings.sum[:] += loops.ki * error * (v == asked)
-            m = v / self.winding.V
-            index[k], before[k] = np.rint(m / self.least) * self.least if self.least else m, windings.i
-            after[k], charge[k] = pass_period(windings.i, index[k], e, self.winding, self.modulator)
-            windings.i[:] = after[k]
-        return done
-
-
-@dataclass(frozen=True, eq=False)
-class TabulatedPassages:
-    """The same passages, from a table: while a current keeps its sign, all that a period does is linear in it and in the EMF.
-
-    The modulation index is a multiple of `least`, so that few linear functions occur; their coefficients come from three
-    passages each.
-    """
-
-    winding: Winding
-    """Shape (sim, joint), the same for all simulations."""
-    modulator: Modulator
-    """Its chopper."""
-    least: float
-    """Step of the modulation index."""
-
-    def advance(self, loops: Loops, windings: Windings, wanted: Array, emf: Array) -> Array:
-        """Advance windings by PWM periods, as `ExactPassages` does."""
-        from idbench.sim.drives.periods import periods  # loads a compiler
-
-        return np.asarray(periods(self._table, loops, windings, wanted, np.ascontiguousarray(emf)))
-
-    @cached_property
-    def _table(self) -> PeriodTable:
-        """What compiled code takes: number of the index 1, where that of 0 is 0, linear functions, and pieces of periods."""
-        V, R, L = (np.ascontiguousarray(x[0]) for x in self.winding)
-        highest = int(np.ceil(1 / self.least))
-        indices = np.arange(-highest, highest + 1, dtype=np.float64) * self.least
-        cut = pieces(self.modulator, indices)
-        kept = np.exp(-cut.duration[..., None] * (R / L))
-        each = [np.broadcast_to(x[..., None], kept.shape) for x in cut]
-        of_pieces = np.ascontiguousarray(np.stack([*each, kept], axis=-1).swapaxes(0, 1))
-        return PeriodTable(self.least, highest, self._linear(indices), of_pieces, V, R, L, bool(self.modulator.dead_time))
-
-    def _linear(self, indices: Array) -> Array:
-        """Charge and the currents at edges, (sign, value, joint) -> (constant, by i, by e) x quantity."""
-        shape = 2, len(indices), self.winding.V.shape[-1]
-        winding = Winding(*(np.broadcast_to(x[0], shape) for x in self.winding))
-        m = np.broadcast_to(indices[:, None], shape)
-        pattern = self.modulator.pattern(m, np.broadcast_to(np.array([0.0, 1.0])[:, None, None], shape))
-        made = []
-        for i, e in ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0)):
-            passage, edges = straight(np.full(shape, i), np.full(shape, e), winding, pattern, self.modulator.period)
-            made.append(np.stack([passage.charge, *edges], axis=-1))
-        constant, by_i, by_e = made
-        return np.stack([constant, by_i - constant, by_e - constant], axis=-2)
 
 
 @settings
@@ -131,7 +55,8 @@ class SwitchedDrive(AbstractDrive):
         V, I = limits(robot, self.bus_voltage, self.current_limit)  # noqa: E741
         if not np.isfinite(V).all():
             raise ScenarioError("drive.bus_voltage is needed: the robot's motors give none")
-        return SwitchedAmplifier(self, robot.motors, V, I, nsim, h)
+        exact = ExactPeriods(self, robot.motors, V, I, nsim, h)
+        return TabulatedPeriods(exact) if exact.least and 2 / exact.least < MAX_VALUES else exact
 
     def lag(self, robot: Robot) -> Array:
         """Return T / (1 - a) - T / 2, from the sampled loop and the hold of its reference."""
@@ -154,46 +79,54 @@ class SwitchedDrive(AbstractDrive):
         return 1 / self.pwm
 
 
-class SwitchedAmplifier(AbstractAmplifier):
-    """The chopper at work."""
+class ExactPeriods(AbstractAmplifier):
+    """The chopper at work, its periods computed one by one for any modulation index, in arrays over windings."""
 
     def __init__(self, settings: SwitchedDrive, motors: Motors, V: Array, I: Array, nsim: int, h: float) -> None:  # noqa: E741
-        R, L, K, V, self._I = (every(x, nsim) for x in (motors.R, motors.L, motors.K, V, I))
-        self._K = K
-        self._h = h
-        self._winding = Winding(V, R, L)
+        R, L, self.K, V, self.I = (np.tile(x, (nsim, 1)) for x in (motors.R, motors.L, motors.K, V, I))
+        self.h, self.winding = h, Winding(V, R, L)
+        self.modulator = Modulator(settings.modulation, h, settings.dead_time)
         lost = -np.expm1(-h * R / L)
-        kp = R / lost * -np.expm1(-2 * np.pi * settings.bandwidth * h)
-        least = settings.duty_resolution * (1 if settings.modulation == "sign_magnitude" else 2)
-        kind = TabulatedPassages if least and 2 / least < MAX_VALUES else ExactPassages
-        self._passages = kind(self._winding, Modulator(settings.modulation, h, settings.dead_time), least)
+        self.kp = R / lost * -np.expm1(-2 * np.pi * settings.bandwidth * h)
+        self.ki, self.known = self.kp * lost, settings.emf_compensation
+        self.least = settings.duty_resolution * (1 if settings.modulation == "sign_magnitude" else 2)
         most = 1 - 4 * settings.dead_time / h
-        self._most = (np.floor(most / least) * least if least else most) * V
-        self._loops = Loops(kp, kp * lost, self._most, settings.emf_compensation)
-        self._windings = Windings(*np.zeros((2, *V.shape)))
+        self.most = (np.floor(most / self.least) * self.least if self.least else most) * V
+        self._i, self._sum = np.zeros((2, *V.shape))
 
     def step(self, demand: Array, speed: Array, steps: int) -> Array:
-        """Advance by PWM periods; return the mean torque in each."""
-        wanted = within(demand / self._K, self._I)
-        e = self._K * speed
-        charge, before, after, index = self._passages.advance(self._loops, self._windings, wanted, e)
-        self.trace = wanted, charge, before, after, e, index
-        return charge * (self._K / self._h)
+        """Advance by PWM periods; return the mean torque in each.
+
+        v = kp (i_ref - i) + sum + known e within its limit; the integrator rests while v is at it.
+        """
+        wanted, emf = np.clip(demand / self.K, -self.I, self.I), self.K * speed
+        charge, before, after, index = done = np.empty((4, *emf.shape))
+        for k, e in enumerate(emf):
+            error = wanted - self._i
+            asked = self.kp * error + self._sum + self.known * e
+            v = np.clip(asked, -self.most, self.most)
+            self._sum = self._sum + self.ki * error * (v == asked)
+            m = v / self.winding.V
+            index[k], before[k] = np.rint(m / self.least) * self.least if self.least else m, self._i
+            after[k], charge[k] = pass_period(self._i, index[k], e, self.winding, self.modulator)
+            self._i = after[k]
+        self.trace = np.broadcast_to(wanted, emf.shape), charge, before, after, emf, index
+        return done[0] * (self.K / self.h)
 
     def electric(self, trace: Trace, dt: Array) -> Electric:
         """Return currents and voltages of PWM periods."""
         reference, charge, before, after, e, index = trace
-        V, R, L = (x[0] for x in self._winding)
+        V, R, L = (x[0] for x in self.winding)
         voltage = (R * charge + L * (after - before)) / dt + e
-        most = self._most[0] / V * (1 - 1e-9)  # as an index is rounded
-        limited = (np.abs(reference) >= self._I[0]) | (np.abs(index) >= most)
+        most = self.most[0] / V * (1 - 1e-9)  # as an index is rounded
+        limited = (np.abs(reference) >= self.I[0]) | (np.abs(index) >= most)
         return Electric(reference, charge / dt, voltage, index, limited.astype(np.float64), e)
 
     def between_edges(self, trace: Trace) -> BetweenEdges:
         """Return current and voltage at the edges of PWM periods, and in the middle between them."""
         _, _, before, _, e, index = trace
-        one = Winding(*(np.broadcast_to(x[0], before.shape).ravel() for x in self._winding))
-        period = pieces(self._passages.modulator, index.ravel())
+        one = Winding(*(np.broadcast_to(x[0], before.shape).ravel() for x in self.winding))
+        period = pieces(self.modulator, index.ravel())
         start, _, goal, dt = stretches(before.ravel(), e.ravel(), one, period)
         begins = np.cumsum(dt, axis=0) - dt
         since = np.array([0.0, 0.5, 1.0])[:, None, None] * dt
@@ -202,3 +135,51 @@ class SwitchedAmplifier(AbstractAmplifier):
         return BetweenEdges(*(
             np.swapaxes(x, 0, 1).reshape(-1, *before.shape) for x in (begins + since, current, voltage)
         ))  # fmt: skip
+
+
+class TabulatedPeriods(AbstractCompiledAmplifier):
+    """The same periods from a table, in C: while a current keeps its sign, all that a period does is linear in it and the EMF.
+
+    The modulation index is a multiple of `least`, so that few linear functions occur; their coefficients come from three
+    passages each.
+    """
+
+    signals: ClassVar[int] = 6
+
+    def __init__(self, exact: ExactPeriods) -> None:
+        self._exact = exact
+        highest = int(np.ceil(1 / exact.least))
+        indices = np.arange(-highest, highest + 1, dtype=np.float64) * exact.least
+        V, R, L = exact.winding
+        cut = pieces(exact.modulator, indices)
+        kept = np.exp(-cut.duration[..., None] * (R[0] / L[0]))
+        each = [np.broadcast_to(x[..., None], kept.shape) for x in cut]
+        # Duration, voltages ahead and behind [bus voltages], and what is kept of the current: (value, piece, joint, 4).
+        self._pieces = np.ascontiguousarray(np.stack([*each, kept], axis=-1).swapaxes(0, 1))
+        self._linear = np.ascontiguousarray(self._functions(indices))
+        table = [*map(pointer, (self._linear, self._pieces)), len(indices), self._linear.shape[-1], len(cut.duration)]
+        rows = exact.K, V, R, L, exact.I, exact.kp, exact.ki, exact.most, exact.known, exact.least, highest
+        dead, shape = bool(exact.modulator.dead_time), (len(V), V.shape[-1])
+        super().__init__("switched_drive", shape, (*rows, dead, 0.0, 0.0), exact.h, objects=[table] * len(V))
+
+    def _functions(self, indices: Array) -> Array:
+        """Charge and the currents at edges, (sign, value, joint) -> (constant, by i, by e) x quantity."""
+        exact = self._exact
+        shape = 2, len(indices), exact.K.shape[-1]
+        winding = Winding(*(np.broadcast_to(x[0], shape) for x in exact.winding))
+        m = np.broadcast_to(indices[:, None], shape)
+        pattern = exact.modulator.pattern(m, np.broadcast_to(np.array([0.0, 1.0])[:, None, None], shape))
+        made = []
+        for i, e in ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0)):
+            passage, edges = straight(np.full(shape, i), np.full(shape, e), winding, pattern, exact.modulator.period)
+            made.append(np.stack([passage.charge, *edges], axis=-1))
+        constant, by_i, by_e = made
+        return np.stack([constant, by_i - constant, by_e - constant], axis=-2)
+
+    def electric(self, trace: Trace, dt: Array) -> Electric:
+        """Return currents and voltages of PWM periods."""
+        return self._exact.electric(trace, dt)
+
+    def between_edges(self, trace: Trace) -> BetweenEdges:
+        """Return current and voltage at the edges of PWM periods, and in the middle between them."""
+        return self._exact.between_edges(trace)

@@ -1,28 +1,34 @@
-"""A run in progress: controller, drive and encoder in NumPy around MuJoCo."""
+"""A run in progress: a compiled loop for each simulation, and what Python does where a part is its own."""
 
+import ctypes
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from math import isfinite
+from functools import partial
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from idbench.identify.blame import expect, expect_kind
+from idbench.identify.compiled import function, pointer
 from idbench.identify.data.motion_log import MotionLog
 from idbench.sim.controllers import AbstractLaw, Task
-from idbench.sim.drives.drive import AbstractAmplifier, every
+from idbench.sim.drives.drive import AbstractAmplifier, AbstractCompiledAmplifier
 from idbench.sim.encoders import AbstractReader
-from idbench.sim.engine.clock import Clock, History
-from idbench.sim.engine.failures import Failures
-from idbench.sim.engine.geared_plant import plant_of
+from idbench.sim.engine.clock import Clock
+from idbench.sim.engine.failures import ADVICE, Bounds
+from idbench.sim.engine.plant import STATE, Plant, SteppedBody
 from idbench.sim.engine.run import Run
-from idbench.sim.engine.watch import Step, Watcher
+from idbench.sim.engine.watch import Watcher
 from idbench.sim.errors import ScenarioError
 from idbench.sim.frictions.friction_law import AbstractContact
+from idbench.sim.part import AbstractCompiledPart, Part
 from idbench.sim.robot.inverse_dynamics import InverseDynamics
 from idbench.sim.robot.motors import Array
+from idbench.sim.robot.payload import with_play
 from idbench.sim.robot.robot import Robot
-from idbench.sim.scenario.measurement import CurrentSensor
+from idbench.sim.robot.varied import VariedRobots, varied_models
+from idbench.sim.scenario.measurement import RippleSeries
 from idbench.sim.scenario.scenario import Scenario
 from idbench.sim.trajectories import Reference
 
@@ -32,60 +38,80 @@ BLOCK = 1e-3
 """Time [s] over which the motion of the rotors may be predicted, for back-EMF and ripple: with a jerk of 1000 rad/s^3 they are
 then off by 2e-7 rad and 5e-4 rad/s."""
 
+READ, COMMAND, DRIVE, RESIST = range(1, 5)  # Where the loop stops for a part in Python (loop.c)
+
+STEP, SAMPLE, STEPS, ROWS, TORQUES, TRACED, BEFORE_STEPS = 0, 2, 3, 4, 5, 7, 8  # Whole numbers that it remembers
+
+BEFORE, COMMANDED, DEMAND, THEN, MEASURED, RESISTANCE = 0, 1, 2, 5, 6, 7  # What it remembers of each joint, of 8
+
+SEEN, MIDDLE_QD, TURNING, ELECTRIC, TAU = 2, 1, 4, 5, 6  # Of each joint in each step to come, of 8
+
+CHANNELS = ("measured", "command", "current", "q", "qd", "tau", "gap")  # What it records
+
+
+class Series(ctypes.Structure):
+    """A ripple."""
+
+    _fields_ = (*((x, ctypes.c_void_p) for x in ("amplitude", "order", "phase", "harmonics")), ("count", ctypes.c_int64))
+
+
+WHOLE = ("n", "samples", "per_sample", "late", "most", "steady", "smooth", "sees_rotor", "signals", "ring")
+
+ARRAYS = ("offsets", "q_ring", "qd_ring", "now", "rows", "records", "drawn", "trace", "numbers")
+
+
+class Loop(ctypes.Structure):
+    """The closed loop of one simulation (loop.c)."""
+
+    _fields_ = (
+        ("body", SteppedBody),
+        *((name, ctypes.c_int64) for name in WHOLE),
+        *((name, ctypes.c_double) for name in ("old", "h", "filter")),
+        *((name, ctypes.POINTER(Part)) for name in ("encoder", "law", "drive", "friction")),
+        *((name, Series) for name in ("cogging", "commutation")),
+        *((name, ctypes.c_void_p) for name in ARRAYS),
+    )
+
 
 class Bench:
     """A run in progress: controller, drive and encoder around a plant."""
 
-    def __init__(  # noqa: PLR0913  # the last by its name
+    def __init__(  # the last by its name
         self,
         scenario: Scenario,
         robot: Robot,
         planned: Reference,
         seeds: tuple[int, ...],
         vary: Mapping[str, npt.ArrayLike],
-        threads: int,
         watcher: Watcher | None = None,
         *,
         informed: bool = False,
     ) -> None:
-        fs = scenario.fs
-        n = robot.n
-        nsim = len(seeds)
-        samples = len(planned.q)
-        self._scenario = scenario
-        self._planned = planned
-        self._seeds = seeds
-        self._watcher = watcher
-        self._h = scenario.drive.step_length(fs, scenario.physics.step)
-        self._clock = clock = Clock(round(1 / fs / self._h), self._h, scenario.timing.delay)
-        self._plant = plant_of(scenario, robot, nsim, self._h, vary, threads)
+        fs, n, nsim, samples = scenario.fs, robot.n, len(seeds), len(planned.q)
+        self._scenario, self._planned, self._seeds, self._watcher = scenario, planned, seeds, watcher
+        h = self._h = scenario.drive.step_length(fs, scenario.physics.step)
+        self.clock = clock = Clock(round(1 / fs / h), h, scenario.timing.delay)
+        self._bounds = Bounds(robot, planned, nsim)
+        self.robots, self._plant = _plant(scenario, robot, vary, self._bounds, h)
         self._plant.put(planned.q[0])
         task = Task(scenario.nominal_robot, planned, nsim, vary if informed else {})
         self._law = expect_kind(scenario.controller, "start", scenario.controller.start(task), AbstractLaw)
-        self._drive = expect_kind(scenario.drive, "start", scenario.drive.start(robot, nsim, self._h), AbstractAmplifier)
-        self._cogging, self._commutation = scenario.ripple.start(robot)
-        self._smooth = scenario.ripple.steady
+        self._drive = expect_kind(scenario.drive, "start", scenario.drive.start(robot, nsim, h), AbstractAmplifier)
+        self._ripples = scenario.ripple.start(robot)
         friction, encoder = scenario.friction, scenario.encoder
-        contact = friction.start(self._plant.joints, self._plant.Fs, self._h)
+        contact = friction.start(self._plant, self._plant.Fs, h)
         self._friction = expect_kind(friction, "start", contact, AbstractContact)
         self._encoder = expect_kind(encoder, "start", encoder.start(n, samples, fs, generators(seeds, 0)), AbstractReader)
-        self._each = nsim, n
-        self._sensor = CurrentSensor(scenario.torque, nsim, n)
-        self._jitter = self._drawn_jitter(samples) if scenario.timing.jitter or scenario.timing.refresh else None
-        self._history = History(
-            clock.late + clock.per_sample + int(np.ceil(scenario.timing.refresh / self._h)), nsim, n, self._h
-        )
-        self._failures = Failures(robot, planned, seeds)
-        self._going: npt.NDArray[np.intp] | None = None
-        self._at_rest = every(planned.q[0], nsim) if planned.q.ndim == 2 else planned.q[0]
-        self._before = self._command = self._demand = _holding(scenario, robot, self._at_rest, vary)
-        self._qd = np.zeros((nsim, n))
-        self._steps = 1
-        self._instants = dict[int, tuple[Array, Array]]()
-        self._steady = scenario.drive.steady and self._smooth
+        self._plant.after_friction()
+        self.failures = dict[int, str]()
         self._most = self._longest()
-        self._measured, self._commands, self._currents, self._q, self._speeds, self._tau = np.zeros((6, samples, nsim, n))
-        self._gaps = np.zeros((samples, nsim, n)) if self._plant.has_play else np.zeros(0)
+        self.numbers = self._plant.numbers
+        self.numbers[:, BEFORE_STEPS] = 1
+        self._now, self._rows = np.zeros((nsim, 8, n)), np.zeros((nsim, 8, self._most, n))
+        self._now[:, [BEFORE, COMMANDED, DEMAND]] = _holding(scenario, robot, planned, nsim, vary)[:, None]
+        self._records = np.zeros((nsim, len(CHANNELS), samples, n))
+        self._traces = list[tuple[Array, ...]]()
+        self._loops = self._looped(samples)
         self.steps = samples * clock.per_sample + clock.late
 
     def _longest(self) -> int:
@@ -94,158 +120,192 @@ class Bench:
         watched = scenario.timing.jitter or scenario.timing.refresh or scenario.torque.source == "current"
         if watched or not scenario.friction.steady:
             return 1
-        return self._clock.per_sample if self._steady else max(1, round(BLOCK / self._h))
+        steady = scenario.drive.steady and scenario.ripple.steady
+        return self.clock.per_sample if steady else max(1, round(BLOCK / self._h))
+
+    def _looped(self, samples: int) -> Any:
+        """Return the loops, at their beginning."""
+        scenario, clock, n, drive = self._scenario, self.clock, self._plant.n, self._drive
+        smooth, timing = scenario.ripple.steady, scenario.timing
+        signals = drive.signals if isinstance(drive, AbstractCompiledAmplifier) else 0
+        reach = clock.late + clock.per_sample + int(np.ceil(timing.refresh / self._h)) + 2
+        offsets = self._drawn_jitter(samples) if timing.jitter or timing.refresh else None
+        self._kept = kept = np.zeros((2, len(self._seeds), reach, n)), offsets, np.zeros((self._most, signals, n))
+        kinds, cutoff = (scenario.drive.steady and smooth, smooth, scenario.drive.before_gear), scenario.torque.cutoff
+        whole = n, samples, clock.per_sample, clock.late, self._most, *kinds, signals, reach
+        numbers = *whole, clock.old, self._h, 2 * np.pi * cutoff if cutoff else np.inf
+        self._series = [_series(ripple) for ripple in self._ripples]
+        every = self._encoder, self._law, drive, self._friction
+        parts = [x.parts if isinstance(x, AbstractCompiledPart) else None for x in every]
+        python = Part(None, n)
+        loops = (Loop * len(self._seeds))()
+        for i, loop in enumerate(loops):
+            own = [None if offsets is None else offsets[i], *kept[0][:, i], self._now[i], self._rows[i], self._records[i]]
+            pointers = [*map(pointer, own), pointer(kept[2]), None, pointer(self.numbers[i])]
+            each = [ctypes.pointer(python if x is None else x[i]) for x in parts]
+            loop.__init__(self._plant.bodies[i], *numbers, *each, *(x for x, _ in self._series), *pointers)
+        return loops
 
     def _drawn_jitter(self, samples: int) -> Array:
-        """Offset of each sample from its claimed instant, or its age, shape (sample, nsim) [steps]."""
-        width = self._scenario.timing.jitter / self._h
-        if width >= self._clock.per_sample:
+        """Offset of each sample from its claimed instant, or its age, shape (nsim, sample) [steps]."""
+        width, per_sample = self._scenario.timing.jitter / self._h, self.clock.per_sample
+        if width >= per_sample:
             raise ScenarioError(
                 f"timing.jitter = {self._scenario.timing.jitter:g} s must be below 1/fs = {1 / self._scenario.fs:g} s"
             )
-        if width / 2 > self._clock.late:
+        if width / 2 > self.clock.late:
             raise ScenarioError(
                 f"timing.jitter = {self._scenario.timing.jitter:g} s needs a timing.delay of at least its half in whole "
                 f"physics steps of {self._h:g} s: a command cannot act before its sample is taken"
             )
         sources = generators(self._seeds, 1)
-        off = np.stack([width * (rng.random(samples) - 0.5) for rng in sources], axis=1)
+        off = np.stack([width * (rng.random(samples) - 0.5) for rng in sources])
         if (period := self._scenario.timing.refresh / self._h) == 0:
             return off
-        instants = np.arange(samples)[:, None] * self._clock.per_sample + off
-        return off - (instants - period * np.array([rng.random() for rng in sources])) % period
+        instants = np.arange(samples) * per_sample + off
+        return off - (instants - period * np.array([[rng.random()] for rng in sources])) % period
 
-    def advance(self, step: int) -> int:
-        """Advance from physics step `step` to where something may change; return how many steps that were."""
-        q, qd = self._plant.q, self._plant.qd
-        sample = self._clock.sample(step)
-        if sample is not None:
-            self._stop_failed(step)
-        if sample is not None and sample < len(self._q):
-            self._q[sample] = q
-            self._speeds[sample] = qd
-            self._currents[sample] = self._sensor.value
-            if self._plant.has_play:
-                self._gaps[sample] = self._plant.rotors[0] - q
-            if self._watcher and self._watcher.due(self._final(step)):
-                self.tell(step)
-        rotor_q, rotor_qd = self._plant.rotors
-        before_gear = self._scenario.drive.before_gear
-        self._history.put(step, *((rotor_q, rotor_qd) if before_gear else (q, qd)))
-        steps = self._listen(step)
-        t, half_square = self._middles(steps)
-        rate = (rotor_qd - self._qd) / (self._steps * self._h)  # accelerating as in the steps before
-        mid_qd, mid_q = rotor_qd + rate * t, rotor_q + rotor_qd * t + rate * half_square
-        self._qd, self._steps = rotor_qd.copy(), steps
-        constant = None if self._smooth else 1 + self._commutation.at(mid_q)
-        apart = self._plant.has_play and not before_gear
-        self._drive.sees(mid_q + (q - rotor_q) + (qd - rotor_qd) * t if apart else mid_q)
-        electric = self._drive.step(self._demand, mid_qd if constant is None else mid_qd * constant, steps)
+    def advance(self, until: int, shares: Any) -> None:
+        """Advance to before physics step `until`; `shares` calls a function with shares of simulations."""
+        watcher, run = self._watcher, function("run_loops", ctypes.c_void_p, *[ctypes.c_int64] * 2, result=ctypes.c_int64)
+        if watcher:
+            rows = until - int(self.numbers[0, STEP]) + self._most
+            trace = np.empty((rows, 3 + (1 + self._loops[0].signals) * self._plant.n))
+            self._loops[0].trace, self.numbers[0, TRACED] = pointer(trace), 0
+        while stops := shares(lambda first, count: run(ctypes.addressof(self._loops[first]), count, until)):
+            self._count_failed()
+            if not any(stops):
+                break
+            {READ: self._read, COMMAND: self._order, DRIVE: self._drive_on, RESIST: self._resist}[max(stops)]()
+        if watcher:
+            watcher.take(trace[: self.numbers[0, TRACED]], self._traces)
+            self._traces = []
+
+    def _read(self) -> None:
+        q = self._encoder.read(self._sample, self._now[:, THEN].copy())
+        self._now[:, MEASURED] = expect(self._encoder, "read", q, self._each)
+
+    def _order(self) -> None:
+        u = self._law.command(self._sample, self._now[:, MEASURED].copy())
+        self._now[:, COMMANDED] = expect(self._law, "command", u, self._each)
+
+    def _drive_on(self) -> None:
+        steps, rows = self.numbers[self._going, [[STEPS], [ROWS]]][:, 0].tolist()
+        demand, (seen, speed) = self._now[:, DEMAND].copy(), self._rows[:, [SEEN, TURNING], :rows].transpose(1, 2, 0, 3).copy()
+        self._drive.sees(seen)
+        electric = self._drive.step(demand, speed, steps)
         expect(self._drive, "step", electric, (1, *self._each), (steps, *self._each))
-        self._sensor.take(electric, steps * self._h)
-        tau = electric if constant is None else electric * constant + self._cogging.at(mid_q)
-        self._friction.driven(tau[0])
-        resistance = self._friction.torque(mid_qd[0])
-        expect(self._friction, "torque", np.asarray(resistance), (), self._each)
-        total = tau + resistance
-        if not isfinite(np.add.reduce(total, axis=None)):
-            self._stop_failed(step)
-            self._failures.finite({"the controller": self._demand, "the drive": tau, "the friction": resistance})
-            self._stop_failed(step)
-        if self._watcher:
-            self._watcher.take(Step(step, steps, tau, self._drive.trace))
-        self._plant.step(total, steps, self._going)
-        current = step // self._clock.per_sample
-        if current < len(self._tau):
-            self._tau[current] += tau[0] if len(tau) == 1 == steps else np.add.reduce(tau) / len(tau) * steps
-        return steps
+        self._rows[:, ELECTRIC, : len(electric)] = electric.swapaxes(0, 1)
+        self.numbers[:, TORQUES] = len(electric)
+        if self._watcher and self._drive.trace:
+            rows = len(electric) if self._scenario.ripple.steady else max(rows, len(electric))
+            each = (x[0][None] if x.ndim == 2 else x[:, 0] for x in self._drive.trace)
+            self._traces.append(tuple(np.repeat(x, rows // len(x), axis=0) for x in each))
 
-    def _final(self, step: int) -> int:
-        """Number of samples that are final at the beginning of physics step `step`."""
-        clock, samples = self._clock, len(self._q)
-        return min(samples, step // clock.per_sample, max(0, (step - clock.late - 1) // clock.per_sample + 1))
-
-    def tell(self, step: int) -> None:
-        """Hand on to the watcher what is final at the beginning of physics step `step`, of the first simulation."""
-        if self._watcher:
-            channels = {
-                "measured": self._measured,
-                "q": self._q,
-                "qd": self._speeds,
-                "tau": self._tau,
-                "command": self._commands,
-                "logged": self._currents if self._scenario.torque.source == "current" else self._commands,
-            }
-            if self._plant.has_play:
-                channels["gap"] = self._gaps
-            self._watcher.tell(self._final(step), self._planned, channels, self._drive)
-
-    def _middles(self, steps: int) -> tuple[Array, Array]:
-        """Return the middle t of each step to come [s], shape (steps, 1, 1), or of all for steady parts, and t^2 / 2."""
-        if steps not in self._instants:
-            count = 1 if self._steady else steps
-            t = np.linspace(0.5, count - 0.5, count)[:, None, None] * (steps / count * self._h)
-            self._instants[steps] = t, t**2 / 2
-        return self._instants[steps]
-
-    def _listen(self, step: int) -> int:
-        """Let the command whose turn it is act; return for how many steps nothing changes."""
-        clock, (k, after) = self._clock, self._clock.command(step)
-        if after == 0 and k >= 0:
-            taken = step - clock.late
-            then = self._history.whole(taken) if self._jitter is None else self._history.at(taken + self._jitter[k])
-            q = self._encoder.read(k, then)
-            expect(self._encoder, "read", q, self._each)
-            self._before, self._command = self._command, expect(self._law, "command", self._law.command(k, q), self._each)
-            self._measured[k], self._commands[k] = q, self._command
-            self._demand = self._command if clock.old == 0 else clock.old * self._before + (1 - clock.old) * self._command
-        elif after == 1:
-            self._demand = self._command
-        if after == 0 and (self._steady or clock.old > 0):
-            return 1  # the current of a new command settles in a step of its own, and so does a mixture of two
-        return min(clock.undisturbed(step), self._most)
+    def _resist(self) -> None:
+        self._plant.before_friction()
+        self._friction.driven(self._rows[:, TAU, 0].copy())
+        resistance = self._friction.torque(self._rows[:, MIDDLE_QD, 0].copy())
+        self._now[:, RESISTANCE] = expect(self._friction, "torque", np.asarray(resistance), (), self._each)
+        self._plant.after_friction()
 
     @property
-    def failures(self) -> Mapping[int, str]:
-        """Why simulations have failed, by their number."""
-        return self._failures.reasons
+    def _going(self) -> int:
+        """A simulation that goes on: all of them are at the same place."""
+        return int(np.argmin(self.numbers[:, STATE] != 0))
+
+    @property
+    def _sample(self) -> int:
+        return int(self.numbers[self._going, SAMPLE])
+
+    @property
+    def _each(self) -> tuple[int, int]:
+        return len(self._seeds), self._plant.n
+
+    def _count_failed(self) -> None:
+        """Say why simulations cannot go on that have stopped; MuJoCo keeps their last state."""
+        for sim in np.flatnonzero(self.numbers[:, STATE]).tolist():
+            if sim in self.failures:
+                continue
+            plant, t = self._plant, self.numbers[sim, STEP] * self._h
+            why, advice = self._bounds.broken(sim, plant.q[sim], plant.qd[sim]), f": {ADVICE}"
+            why = f"{why} {t:.3g} s after the start" if why else ""
+            if not why and (trouble := plant.trouble(sim)):
+                why, advice = f"MuJoCo cannot go on: {trouble}", ""
+            if not why:
+                why, advice = f"{self._broken_part(sim)} gives no finite torque", ""
+            self.failures[sim] = f"{why} (seed {self._seeds[sim]}){advice}"
+
+    def _broken_part(self, sim: int) -> str:
+        """The first part whose torque has no size."""
+        rows = self._rows[sim, TAU, : self.numbers[sim, ROWS]]
+        torques = {"the controller": self._now[sim, DEMAND], "the drive": rows, "the friction": self._now[sim, RESISTANCE]}
+        return next((part for part, torque in torques.items() if not np.isfinite(torque).all()), "the friction")
+
+    def next_stop(self, step: int) -> int:
+        """Physics step up to which to advance from another: a hundredth of the run, or what somebody who watches waits for."""
+        clock, samples = self.clock, self._records.shape[2]
+        k = step // clock.per_sample + -(-samples // 100)
+        if self._watcher:
+            while k > step // clock.per_sample + 1 and clock.final((k - 1) * clock.per_sample) >= self._watcher.awaited:
+                k -= 1
+        return self.steps if k >= samples else k * clock.per_sample
+
+    def tell(self, *, ended: bool = False) -> None:
+        """Hand on to the watcher a stretch of the first simulation, if it is complete, or will not be."""
+        final = min(self._records.shape[2], self.clock.final(int(self.numbers[0, STEP])))
+        if self._watcher and (ended or final >= self._watcher.awaited):
+            channels = {name: self._records[0, CHANNELS.index(name)] for name in ("measured", "q", "qd", "tau", "command")}
+            channels["logged"] = self._records[0, CHANNELS.index(self._scenario.torque.recorded)]
+            if self._plant.stride == 2:
+                channels["gap"] = self._records[0, CHANNELS.index("gap")]
+            self._watcher.tell(final, self._planned, channels, self._drive)
 
     def run(self, skipped: int) -> Run:
         """Records since sample `skipped`."""
-        channels = self._measured, self._commands, self._currents, self._q, self._speeds, self._tau / self._clock.per_sample
-        measured, command, current, q, qd, tau = (np.swapaxes(x[skipped:], 0, 1) for x in channels)
-        for sim in np.flatnonzero(~np.isfinite(command).all(axis=(1, 2))):
-            self._failures.add(int(sim), "the controller commands no finite torque")
-        for failed in self._failures.reasons:
-            measured[failed] = command[failed] = current[failed] = 0.0
-        scenario, n = self._scenario, q.shape[-1]
-        logged = scenario.torque.logged(
-            current if scenario.torque.source == "current" else command, n, generators(self._seeds, NOISE)
-        )
+        for sim in np.flatnonzero(~np.isfinite(self._records[:, CHANNELS.index("command")]).all(axis=(1, 2))).tolist():
+            self.failures.setdefault(sim, f"the controller commands no finite torque (seed {self._seeds[sim]})")
+        self._records[list(self.failures), : CHANNELS.index("q")] = 0.0
+        scenario, records = self._scenario, dict(zip(CHANNELS, self._records[:, :, skipped:].swapaxes(0, 1), strict=True))
+        command, n = records["command"], self._plant.n
+        logged = scenario.torque.logged(records[scenario.torque.recorded], n, generators(self._seeds, NOISE))
         planned = replace(self._planned, **{x: getattr(self._planned, x)[skipped:] for x in ("q", "qd", "qdd")})
-        t = (skipped + np.arange(q.shape[1])) / scenario.fs
+        t = (skipped + np.arange(command.shape[1])) / scenario.fs
         conditions = scenario.friction.conditions(t, n) | scenario.drive.conditions(t, command)
-        log = MotionLog(scenario.fs, measured, logged, scenario.channel, conditions)
-        return Run(scenario, self._seeds, self._plant.robots, planned, log, q, qd, tau, command, self._failures.reasons)
-
-    def _stop_failed(self, step: int) -> None:
-        """Leave simulations at rest that cannot go on."""
-        plant, failures = self._plant, self._failures
-        failures.look(step / self._clock.per_sample, plant.q, plant.qd)
-        for sim, complaint in plant.troubles.items():
-            failures.add(sim, f"MuJoCo cannot go on: {complaint}")
-        if failures.reasons:
-            failed = list(failures.reasons)
-            plant.put(self._at_rest[failed], np.array(failed))
-            self._going = np.setdiff1d(np.arange(len(self._seeds)), failed)
+        log = MotionLog(scenario.fs, records["measured"], logged, scenario.channel, conditions)
+        truth = records["q"], records["qd"], records["tau"] / self.clock.per_sample, command
+        return Run(scenario, self._seeds, self.robots, planned, log, *truth, self.failures)
 
 
-def _holding(scenario: Scenario, robot: Robot, at_rest: Array, vary: Mapping[str, npt.ArrayLike]) -> Array:
+def _plant(
+    scenario: Scenario, robot: Robot, vary: Mapping[str, npt.ArrayLike], bounds: Bounds, h: float
+) -> tuple[Sequence[Robot], Plant]:
+    """Return the robots of the simulations, and their bodies, of two hinges a joint where the drive has play."""
+    nsim, play = len(bounds.box[0]), scenario.drive.play(robot)
+    robots = VariedRobots(robot, nsim, vary) if vary else (robot,) * nsim
+    if not play.any():
+        return robots, Plant(varied_models(robot, nsim, vary), scenario.physics, h, bounds)
+    if vary:
+        raise ScenarioError(f"a robot with backlash has the parameters of its file: {', '.join(vary)} cannot vary")
+    edits = scenario.payload.edit, scenario.friction.edit, scenario.drive.edit, partial(with_play, play=play, h=h)
+    model = Robot.load(scenario.robot, *edits).model
+    return robots, Plant([model] * nsim, scenario.physics, h, bounds, 2)
+
+
+def _series(ripple: RippleSeries) -> tuple[Series, list[Array]]:
+    """Return a ripple as C takes it, and the arrays that it points to."""
+    arrays = [np.ascontiguousarray(x, dtype=np.float64) for x in (ripple.amplitude, ripple.order, ripple.phase)]
+    arrays.append(np.array(ripple.harmonics))
+    return Series(*map(pointer, arrays), len(ripple.harmonics)), arrays
+
+
+def _holding(scenario: Scenario, robot: Robot, planned: Reference, nsim: int, vary: Mapping[str, npt.ArrayLike]) -> Array:
     """Return the command that holds robots at rest, shape (nsim, joint): positions, or their gravity torques [N m]."""
+    at_rest = np.array(np.broadcast_to(planned.q[0], (nsim, robot.n)))
     if scenario.controller.commanded == "position":
-        return at_rest.copy()
+        return at_rest
     still = np.zeros_like(at_rest)
-    return InverseDynamics(robot, len(at_rest), vary)(at_rest, still, still)
+    return InverseDynamics(robot, nsim, vary)(at_rest, still, still)
 
 
 def generators(seeds: Sequence[int], stream: int) -> list[np.random.Generator]:

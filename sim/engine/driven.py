@@ -12,8 +12,8 @@ import numpy.typing as npt
 from idbench.identify.data.motion_log import MotionLog
 from idbench.identify.errors import InvariantError
 from idbench.sim.drives import IdealDrive
+from idbench.sim.engine.batched import BatchedPlant
 from idbench.sim.engine.failures import Bounds
-from idbench.sim.engine.plant import Plant
 from idbench.sim.errors import RobotError, ScenarioError
 from idbench.sim.robot.inverse_dynamics import BLOCK, InverseDynamics
 from idbench.sim.robot.motors import Array
@@ -25,7 +25,7 @@ STEP, SHORTEST = 0.002, 0.001
 """Longest physics step [s], by RK4 (positions of six held joints change by 3e-6 rad of 2e-4 when it is halved), and how short
 one is for joints that friction stops in less."""
 
-Feedback = Callable[[int, Plant], Array]
+Feedback = Callable[[int, BatchedPlant], Array]
 """Torque beside that of the log at a sample [N m], shape (nsim, joint)."""
 
 
@@ -67,10 +67,10 @@ def _replayed(robots: Sequence[Robot], logs: Sequence[MotionLog], qd: Array, ban
     failed = dict[int, str]()
     bounds = Bounds(robots[0], reference, nsim)
 
-    def held(k: int, plant: Plant) -> Array:
-        for sim, why in {**plant.troubles, **bounds.broken(plant.q, plant.qd)}.items():
+    def held(k: int, plant: BatchedPlant) -> Array:
+        for sim, why in {**plant.troubles, **bounds.all_broken(plant.q, plant.qd)}.items():
             failed.setdefault(sim, f"a robot with these parameters does not follow the log: {why} after {k / log.fs:.3g} s")
-            plant.put(log.q[k], np.array([sim]))
+            plant.put(log.q[k], sim)
         found: Array = kp[k] * (log.q[k] - plant.q + 2 / bandwidth * (qd[k] - plant.qd))
         return found
 
@@ -149,13 +149,13 @@ def _start(
     qd: Array,
     vary: Mapping[str, npt.ArrayLike] | None = None,
     threads: int = 1,
-) -> tuple[Plant, Array]:
+) -> tuple[BatchedPlant, Array]:
     """Return robots in states [rad, rad/s], and the torques of logs, one after another, in every physics step.
 
     The torques have the shape (step, time, joint).
     """
     log, physics = logs[0], physics_of(robots[0], logs[0])
-    plant = Plant(robots[0], len(q), physics, physics.step, vary or {}, threads)
+    plant = BatchedPlant(robots[0], len(q), physics, physics.step, vary or {}, threads)
     plant.q[:], plant.qd[:] = q, qd
     if len(robots) > 1:
         plant.become(robots)
@@ -178,7 +178,7 @@ def physics_of(robot: Robot, log: MotionLog) -> Physics:
 
 
 def _driven(
-    started: tuple[Plant, Array], first: npt.NDArray[np.intp], count: int, feedback: Feedback | None = None
+    started: tuple[BatchedPlant, Array], first: npt.NDArray[np.intp], count: int, feedback: Feedback | None = None
 ) -> tuple[Array, list[int]]:
     """Return positions from some samples of a log on, shape (sim, count, joint), and the simulations that ran away."""
     plant, torques = started
@@ -189,7 +189,7 @@ def _driven(
         if feedback is not None:
             acting += feedback(k, plant)
         if k + 1 < count:
-            plant.step(acting, len(torques))
+            plant.step(acting)
     return found, list(plant.troubles)
 
 

@@ -1,6 +1,4 @@
-"""Simulations that cannot go on: which they are, and why."""
-
-from collections.abc import Mapping, Sequence
+"""Simulations that cannot go on, and why."""
 
 import numpy as np
 
@@ -32,19 +30,23 @@ class Bounds:
             np.where(self._limited, np.maximum(robot.ranges[:, 1], high), high + room),
         )
         low, high = (np.broadcast_to(end, (nsim, robot.n)) for end in ends)
-        self._middle, self._half = (low + high) / 2, (high - low) / 2
-        self._fastest = FAST * np.maximum(np.abs(planned.qd).max(axis=0), MIN_SPEED)
+        fastest = FAST * np.maximum(np.abs(planned.qd).max(axis=0), MIN_SPEED)
+        self.box: tuple[Array, Array, Array] = (low + high) / 2, (high - low) / 2, np.broadcast_to(fastest, (nsim, robot.n))
+        """Middle and half of the range of positions, and largest speed, shape (nsim, joint)."""
 
-    def broken(self, q: Array, qd: Array) -> dict[int, str]:
-        """Return the simulations whose state, shape (nsim, joint), is none of a loop at work, and what their joint does."""
-        inside, slow = np.abs(q - self._middle) <= self._half, np.abs(qd) <= self._fastest  # both False for NaN
-        if inside.all() and slow.all():
-            return {}
-        found = dict[int, str]()
-        for sim, j in np.argwhere(~(inside & slow)).tolist():
-            why = self._why(j, float(q[sim, j]), float(qd[sim, j]), bool(inside[sim, j]))
-            found.setdefault(sim, f"joint {self._joints[j]} {why}")
-        return found
+    def broken(self, sim: int, q: Array, qd: Array) -> str:
+        """What a joint does in a simulation whose state, shape (joint,), is none of a loop at work; empty if it is one."""
+        middle, half, fastest = (x[sim] for x in self.box)
+        inside, slow = np.abs(q - middle) <= half, np.abs(qd) <= fastest  # both False for NaN
+        for j in np.flatnonzero(~(inside & slow)).tolist():
+            return f"joint {self._joints[j]} {self._why(j, float(q[j]), float(qd[j]), bool(inside[j]))}"
+        return ""
+
+    def all_broken(self, q: Array, qd: Array) -> dict[int, str]:
+        """Return what is broken in simulations, by their number; states of all, shape (nsim, joint)."""
+        middle, half, fastest = self.box
+        good = (np.abs(q - middle) <= half) & (np.abs(qd) <= fastest)  # False for NaN
+        return {sim: self.broken(sim, q[sim], qd[sim]) for sim in np.flatnonzero(~good.all(axis=1)).tolist()}
 
     def _why(self, j: int, q: float, qd: float, inside: bool) -> str:
         if not np.isfinite([q, qd]).all():
@@ -52,32 +54,3 @@ class Bounds:
         if inside:
             return f"runs away at {qd:.3g} {self._unit[j]}/s"
         return "leaves its range" if self._limited[j] else f"runs away to {q:.3g} {self._unit[j]}"
-
-
-class Failures:
-    """The simulations of a run that have failed, each by itself."""
-
-    def __init__(self, robot: Robot, planned: Reference, seeds: Sequence[int]) -> None:
-        self.reasons: dict[int, str] = {}
-        self._bounds = Bounds(robot, planned, len(seeds))
-        self._fs = planned.fs
-        self._seeds = seeds
-
-    def look(self, sample: float, q: Array, qd: Array) -> None:
-        """Count simulations as failed whose state, shape (nsim, joint), is none of a loop at work.
-
-        `sample` says when that is, in sampling periods after the start.
-        """
-        for sim, what in self._bounds.broken(q, qd).items():
-            self.add(sim, f"{what} {sample / self._fs:.3g} s after the start", ADVICE)
-
-    def finite(self, torques: Mapping[str, Array | float]) -> None:
-        """Count simulations as failed in which a part of the bench gives a torque, shape (..., nsim, joint), of no size."""
-        for part, torque in torques.items():
-            good = np.broadcast_to(np.isfinite(torque), (1, len(self._seeds), 1) if np.ndim(torque) == 0 else np.shape(torque))
-            for sim in np.unique(np.argwhere(~good)[:, -2]).tolist():
-                self.add(sim, f"{part} gives no finite torque")
-
-    def add(self, sim: int, what: str, advice: str = "") -> None:
-        """Let a simulation count as failed, for the first reason that is found."""
-        self.reasons.setdefault(sim, f"{what} (seed {self._seeds[sim]})" + (f": {advice}" if advice else ""))

@@ -1,21 +1,23 @@
-"""The rigid bodies of many simulations, in MuJoCo."""
+"""The rigid bodies of many simulations, in MuJoCo, as the compiled loop takes them."""
 
-from collections.abc import Mapping, Sequence
+import ctypes
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from copy import copy
-from typing import ClassVar
+from functools import cache
+from itertools import pairwise
+from os import cpu_count
+from typing import Any
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
-from mujoco.batch import Batch, SimulationError
 
-from idbench.sim.errors import RobotError
+from idbench.identify.compiled import function, pointer
+from idbench.sim.engine.failures import Bounds
+from idbench.sim.part import mujoco_function
 from idbench.sim.robot.motors import Array
-from idbench.sim.robot.robot import Robot
-from idbench.sim.robot.varied import VariedRobots, vary_fields
 from idbench.sim.scenario.scenario import Physics
-
-ALL = slice(None)
 
 SWITCHED_OFF = (
     mujoco.mjtDisableBit.mjDSBL_ACTUATION,
@@ -26,94 +28,129 @@ SWITCHED_OFF = (
 )
 """Of MuJoCo."""
 
+SAMPLE, STATE, COUNT = 2, 6, 9
+"""Places of whole numbers that C remembers of a simulation (loop.c): its sample, how it is; and how many there are."""
+
+RUNNING, OUT_OF_BOUNDS, NOT_FINITE, STOPPED = range(4)
+"""How a simulation is."""
+
+
+class SteppedBody(ctypes.Structure):
+    """The robot of one simulation in MuJoCo, and where a loop at work keeps it."""
+
+    _fields_ = (
+        *((name, ctypes.c_void_p) for name in ("step", "model", "data", "qpos", "qvel", "applied", "warned")),
+        *((name, ctypes.c_int64) for name in ("n", "stride")),
+        *((name, ctypes.c_void_p) for name in ("middle", "half", "fastest", "numbers", "complaint")),
+    )
+
 
 class Plant:
-    """Simulations of a robot whose joints are driven by torques, in steps of `h` [s]; its actuators are switched off.
+    """Simulations of robots whose joints are driven by torques, in steps of `h` [s]; their actuators are switched off.
 
-    `vary` has fields of MuJoCo's model with a value for each simulation, shape (nsim, ...); no threads are all processors.
+    Parameters
+    ----------
+    models : sequence of mujoco.MjModel
+        For each simulation.
+    physics : Physics
+        Whose integrator steps them.
+    bounds : Bounds
+        Where they are at work.
+    stride : int
+        Degrees of freedom of a joint: two with free play, rotor behind the gear, and link relative to it. MuJoCo solves the
+        contact at the ends of the play together with all else, so that it is stable however light the link is; a dead zone in
+        the drive would need steps as short as the lightest link wants.
     """
 
-    has_play: ClassVar[bool] = False
-
-    def __init__(
-        self, robot: Robot, nsim: int, physics: Physics, h: float, vary: Mapping[str, npt.ArrayLike], threads: int
-    ) -> None:
-        self._begin(robot.model, physics, h, nsim, threads)
-        vary_fields(self.batch, vary)
-        self.robots: Sequence[Robot] = VariedRobots(robot, nsim, vary) if vary else (robot,) * nsim
-        self.q, self.qd, self._applied = (self.batch.bind(name) for name in ("qpos", "qvel", "qfrc_applied"))
-        expanded = self.batch.expanded("dof_frictionloss")
-        model = robot.model
-        self.Fs: Array = np.array(np.broadcast_to(model.dof_frictionloss, (nsim, robot.n)) if expanded is None else expanded)
-
-    def _begin(self, described: mujoco.MjModel, physics: Physics, h: float, nsim: int, threads: int) -> None:
-        self._settings = h, physics.integrator
-        self.batch = Batch(_stepping(described, *self._settings), nsim, threads)
-        self._errors: dict[int, str] = {}
-
-    def become(self, robots: Sequence[Robot]) -> None:
-        """Make every simulation of a plant, of which no fields vary, that of a robot which differs in parameters alone.
-
-        Raises
-        ------
-        RobotError
-            If they differ in more: MuJoCo's data would have another layout.
-        """
-        try:
-            self.batch.set_models([_stepping(robot.model, *self._settings) for robot in robots])
-        except mujoco.FatalError as error:
-            raise RobotError(f"robots of one batch differ in more than parameters: {error}") from error
-        self.robots = tuple(robots)
-        self.Fs = np.stack([robot.model.dof_frictionloss for robot in robots])
+    def __init__(self, models: Sequence[mujoco.MjModel], physics: Physics, h: float, bounds: Bounds, stride: int = 1) -> None:
+        nsim, n = len(models), models[0].nv // stride
+        self.stride, self.n, self.h = stride, n, h
+        self.models = [stepping(model, h, physics.integrator) for model in models]
+        self.datas = [mujoco.MjData(model) for model in self.models]
+        self.numbers, self._complaints = np.zeros((nsim, COUNT), dtype=np.int64), np.zeros((nsim, 1024), dtype=np.uint8)
+        middle, half, fastest = self._box = [np.ascontiguousarray(x) for x in bounds.box]
+        self.bodies = (SteppedBody * nsim)()
+        for i, (body, m, d) in enumerate(zip(self.bodies, self.models, self.datas, strict=True)):
+            arrays = d.qpos, d.qvel, d.qfrc_applied
+            warned = d.warning.number.ctypes.data  # a column of pairs
+            places = map(pointer, (middle[i], half[i], fastest[i], self.numbers[i], self._complaints[i]))
+            body.__init__(mujoco_function("mj_step"), m._address, d._address, *map(pointer, arrays), warned, n, stride, *places)
+        self.Fs: Array = np.stack([model.dof_frictionloss[::stride] for model in self.models])
+        self._bound, self._expanded = dict[str, Array](), dict[str, Array]()
 
     @property
-    def joints(self) -> Batch:
-        """The simulations as frictions see them: fields of a value a joint."""
-        return self.batch
+    def q(self) -> Array:
+        """Positions of the links [rad], shape (nsim, joint)."""
+        return self._of_links("qpos")
 
     @property
-    def rotors(self) -> tuple[Array, Array]:
-        """Positions [rad] and velocities [rad/s] of the rotors behind the gear, shape (nsim, joint)."""
-        return self.q, self.qd
+    def qd(self) -> Array:
+        """Velocities of the links [rad/s], shape (nsim, joint)."""
+        return self._of_links("qvel")
 
-    def put(self, q: Array, some: npt.NDArray[np.intp] | slice = ALL) -> None:
-        """Put simulations where they are at rest: q [rad], shape (joint,) or (nsim, joint)."""
-        self.q[some], self.qd[some] = q, 0.0
+    def _of_links(self, name: str) -> Array:
+        every = np.stack([getattr(d, name) for d in self.datas])
+        return every if self.stride == 1 else every[:, ::2] + every[:, 1::2]
 
-    def step(self, torques: Array, steps: int, going: npt.NDArray[np.intp] | None = None) -> None:
-        """Advance simulations by `steps` physics steps.
+    def put(self, q: Array) -> None:
+        """Put links where they are at rest [rad], in the middle of their play; shape (joint,) or (nsim, joint)."""
+        for d, position in zip(self.datas, np.broadcast_to(q, (len(self.datas), self.n)), strict=True):
+            d.qpos[:: self.stride] = position
 
-        Parameters
-        ----------
-        torques : Array, shape (steps or 1, nsim, joint)
-            On the joints in every step, or the same in all of them [N m].
-        steps : int
-            How many.
-        going : int array, optional
-            The simulations that advance; all by default.
-        """
-        try:
-            if len(torques) == 1:
-                self._applied[:] = torques[0]
-                self.batch.step(going, steps)
-            else:
-                control = np.ascontiguousarray(np.swapaxes(torques if going is None else torques[:, going], 0, 1))
-                self.batch.rollout(steps, control, int(mujoco.mjtState.mjSTATE_QFRC_APPLIED), record=(), ids=going)
-        except SimulationError as error:
-            self._errors |= {int(sim): " ".join(self.batch.error(int(sim)).split()) for sim in error.ids}
+    def bind(self, name: str) -> Array:
+        """Return a field of the data, shape (nsim, joint), that `before_friction` keeps as it is."""
+        self._bound[name] = np.stack([getattr(d, name)[:: self.stride] for d in self.datas])
+        return self._bound[name]
 
-    @property
-    def troubles(self) -> dict[int, str]:
-        """What MuJoCo has complained of, by the number of the simulation."""
-        found = dict(self._errors)
-        if not self.batch.warning[..., 1].any():
-            return found
-        for sim, kind in np.argwhere(self.batch.warning[..., 1]).tolist():
-            found.setdefault(sim, mujoco.mju_warningText(kind, int(self.batch.warning[sim, kind, 0])))
-        return found
+    def expand(self, name: str) -> Array:
+        """Return a field of the model, shape (nsim, joint), which `after_friction` takes as it is."""
+        return self._expanded.setdefault(name, np.stack([getattr(m, name)[:: self.stride] for m in self.models]))
+
+    def addresses(self, name: str) -> list[int]:
+        """Where a field of the model or the data begins, in each simulation."""
+        owners = self.models if hasattr(self.models[0], name) else self.datas
+        return [getattr(owner, name).ctypes.data for owner in owners]
+
+    def before_friction(self) -> None:
+        """Bring what is bound up to date."""
+        for name, values in self._bound.items():
+            for d, value in zip(self.datas, values, strict=True):
+                value[:] = getattr(d, name)[:: self.stride]
+
+    def after_friction(self) -> None:
+        """Write what was expanded into the models."""
+        for name, values in self._expanded.items():
+            for m, value in zip(self.models, values, strict=True):
+                getattr(m, name)[:: self.stride] = value
+
+    def trouble(self, sim: int) -> str:
+        """What MuJoCo complains of in a simulation; empty if of nothing."""
+        if self.numbers[sim, STATE] == STOPPED:
+            return " ".join(self._complaints[sim].tobytes().split(b"\0")[0].decode(errors="replace").split())
+        warnings = self.datas[sim].warning
+        return next((mujoco.mju_warningText(k, int(w.lastinfo)) for k, w in enumerate(warnings) if w.number), "")
 
 
-def _stepping(described: mujoco.MjModel, h: float, integrator: str) -> mujoco.MjModel:
+@cache
+def _guard() -> None:
+    """Let an error of MuJoCo end its simulation, instead of the process."""
+    function("catch_errors", ctypes.c_void_p)(mujoco_function("mju_setLogHandler"))
+
+
+@contextmanager
+def side_by_side(count: int, threads: int) -> Iterator[Callable[[Callable[[int, int], Any]], list[Any]]]:
+    """Yield what calls a function with (first, number) of shares of simulations, on native threads: 0 are all processors."""
+    _guard()
+    edges = np.linspace(0, count, min(threads or cpu_count() or 1, count) + 1).astype(int).tolist()
+    shares = [(a, b - a) for a, b in pairwise(edges)]
+    if len(shares) == 1:
+        yield lambda call: [call(*shares[0])]
+        return
+    with ThreadPoolExecutor(len(shares)) as pool:
+        yield lambda call: list(pool.map(lambda share: call(*share), shares))
+
+
+def stepping(described: mujoco.MjModel, h: float, integrator: str) -> mujoco.MjModel:
     """Return a robot's model with a physics step [s] and an integrator, driven by torques alone."""
     model = copy(described)
     model.opt.timestep = h

@@ -8,6 +8,7 @@ import numpy.typing as npt
 
 from idbench.identify.blame import blamed
 from idbench.sim.engine.bench import NOISE, Bench, generators
+from idbench.sim.engine.plant import side_by_side
 from idbench.sim.engine.run import Run, faulty
 from idbench.sim.engine.watch import Watch, Watcher
 from idbench.sim.errors import ScenarioError
@@ -77,19 +78,17 @@ def simulate(  # noqa: PLR0913  # all but two by their names
     h = scenario.drive.step_length(scenario.fs, scenario.physics.step)
     logged = partial(scenario.torque.logged, n=robot.n, rngs=generators(seeds[:1], NOISE))
     watcher = Watcher(watch, scenario, h, skipped, logged) if watch else None
-    with blamed():
-        bench = Bench(scenario, robot, planned, seeds, vary or {}, threads, watcher, informed=informed)
-    step = 0
-    reported = -1
-    bearable = 0 if throw else len(seeds) - 1
+    step, bearable = 0, 0 if throw else len(seeds) - 1
     # Of simulations that diverge: each is reported, and ends, alone.
-    with np.errstate(over="ignore", invalid="ignore"), blamed():
+    with blamed(), np.errstate(over="ignore", invalid="ignore"), side_by_side(len(seeds), threads) as shares:
+        bench = Bench(scenario, robot, planned, seeds, vary or {}, watcher, informed=informed)
         while step < bench.steps and len(bench.failures) <= bearable:
-            step += bench.advance(step)
-            if progress and 100 * step // bench.steps > reported:
-                reported = 100 * step // bench.steps
+            step = bench.next_stop(step)
+            bench.advance(step, shares)
+            bench.tell()
+            if progress:
                 progress(step / bench.steps)
-    bench.tell(step)
+        bench.tell(ended=True)
     run = faulty(bench.run(skipped))
     if throw and run.failures:
         raise ScenarioError(next(iter(run.failures.values())))

@@ -1,12 +1,10 @@
 """Watching a run while it goes on: what has become final, stretch by stretch."""
 
-from bisect import bisect_left
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from idbench.sim.drives.drive import AbstractAmplifier, BetweenEdges, Electric, Trace
 from idbench.sim.robot.motors import Array
@@ -70,22 +68,6 @@ class Watch:
     """From when to when, on the time of the log [s], the signals inside the loop are given at their full rate."""
 
 
-class Step(NamedTuple):
-    """What the motors did from a physics step on."""
-
-    step: int
-    """The first."""
-
-    steps: int
-    """How many there are."""
-
-    tau: Array
-    """Torque of the motors [N m], shape (steps or 1, nsim, joint)."""
-
-    trace: Trace
-    """What their drive did."""
-
-
 class Watcher:
     """Collects what the motors do, and hands on what has become final, from sample `skipped` on, where the log begins.
 
@@ -101,30 +83,35 @@ class Watcher:
         self._skipped = skipped
         self._logged = logged
         self._samples = max(1, round(watch.every * fs)) if np.isfinite(watch.every) else np.inf
-        self._told, self._taken = skipped, list[Step]()
+        self._told, self._rows = skipped, list[Array]()
 
-    def take(self, step: Step) -> None:
-        """Take in what the motors do."""
-        self._taken.append(step)
+    def take(self, rows: Array, traces: Sequence[Trace]) -> None:
+        """Take in what the motors do: rows as the loop writes them, and the traces of a drive in Python."""
+        if traces:
+            signals = np.stack([np.concatenate(x) for x in zip(*traces, strict=True)], axis=1)
+            rows = np.concatenate([rows, signals.reshape(len(rows), -1)], axis=1)
+        self._rows.append(rows)
 
-    def due(self, final: int) -> bool:
-        """True if a stretch is complete when `final` samples are."""
-        return final - self._told >= self._samples
+    @property
+    def awaited(self) -> float:
+        """Number of samples that complete a stretch."""
+        return self._told + self._samples
 
     def tell(self, final: int, planned: Reference, channels: Mapping[str, Array], drive: AbstractAmplifier) -> None:
-        """Hand on the samples up to `final`; `channels` hold all samples, approach included, shape (sample, nsim, joint)."""
+        """Hand on the samples up to `final`; `channels` hold all samples, approach included, shape (sample, joint)."""
         if final <= self._told:
             return
         now, per_sample = slice(self._told, final), round(1 / (self._fs * self._h))
-        parts: dict[str, Any] = {name: x[now, 0].copy() for name, x in channels.items()}
+        parts: dict[str, Any] = {name: x[now].copy() for name, x in channels.items()}
         parts["tau"] /= per_sample
         parts["logged"] = self._logged(parts["logged"][None])[0]
         reference = Reference(self._fs, *(_alone(getattr(planned, x)[now]) for x in ("q", "qd", "qdd")))
-        ready = bisect_left(self._taken, final * per_sample, key=lambda taken: taken.step)
-        taken, self._taken = self._taken[:ready], self._taken[ready:]
         electric, inner = None, None
-        if taken and taken[0].trace:
-            rows = _Rows.of(taken, drive, self._h)
+        every = np.concatenate(self._rows)
+        ready = int(np.searchsorted(every[:, 0], final * per_sample))
+        self._rows = [every[ready:].copy()]
+        if every.shape[1] > 3 + planned.q.shape[-1]:
+            rows = _Rows.of(every[:ready], drive, self._h, planned.q.shape[-1])
             electric = rows.means(self._told, final, per_sample)
             inner = rows.inside(self._watch.window, self._h, self._skipped / self._fs, drive) if self._watch.window else None
         parts |= {"electric": electric, "inner": inner}
@@ -147,20 +134,10 @@ class _Rows:
     trace: Trace
 
     @classmethod
-    def of(cls, taken: Sequence[Step], drive: AbstractAmplifier, h: float) -> "_Rows":
-        """Return the steps of a drive, unrolled: a trace, or a torque, that has several rows says what each step did."""
-        steps = np.array([s.steps for s in taken])
-        rows = np.array([max([len(x) for x in s.trace if x.ndim == 3], default=1) for s in taken])
-        count = np.array([max(n, len(s.tau)) for n, s in zip(rows, taken, strict=True)])
-        length = np.repeat(steps // count, count)
-        within = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
-        start = np.repeat([s.step for s in taken], count) + within * length
-        traces = tuple(_unrolled(x, rows) for x in zip(*(s.trace for s in taken), strict=True))
-        whole = drive.electric(traces, (np.repeat(steps / rows, rows) * h)[:, None])
-        again = np.repeat(count // rows, rows)  # a mean over several steps holds for each of them
-        electric = Electric(*(np.repeat(x, again, axis=0) for x in whole))
-        trace = tuple(np.repeat(x, again, axis=0) for x in traces)
-        return cls(start, length.astype(np.float64), electric, _unrolled([s.tau for s in taken], count), trace)
+    def of(cls, rows: Array, drive: AbstractAmplifier, h: float, n: int) -> "_Rows":
+        """Return rows of the loop: start, length, that of a row of the drive's own, torques, and the drive's signals."""
+        trace = tuple(rows[:, 3 + n :].reshape(len(rows), -1, n).swapaxes(0, 1))
+        return cls(rows[:, 0], rows[:, 1], drive.electric(trace, rows[:, 2:3] * h), rows[:, 3 : 3 + n], trace)
 
     def means(self, first: int, final: int, per_sample: int) -> Electric:
         """Return the means over the samples from `first` to before `final`."""
@@ -178,11 +155,3 @@ class _Rows:
             return None
         edges = drive.between_edges(tuple(x[within] for x in self.trace))
         return Inner(t[within], Electric(*(x[within] for x in self.electric)), self.tau[within], edges)
-
-
-def _unrolled(arrays: Sequence[Array], count: npt.NDArray[np.int64]) -> Array:
-    """Return arrays of shape (steps or 1, nsim, joint) or (nsim, joint) of the first simulation as one, `count` rows each."""
-    if arrays[0].ndim == 2:
-        return np.repeat([x[0] for x in arrays], count, axis=0)
-    rows, lengths = np.concatenate([x[:, 0] for x in arrays]), np.array([len(x) for x in arrays])
-    return rows if (lengths == count).all() else np.repeat(rows, count, axis=0)

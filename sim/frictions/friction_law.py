@@ -2,11 +2,12 @@
 
 from abc import ABC, abstractmethod
 from dataclasses import field
-from typing import ClassVar, final
+from typing import ClassVar, Protocol, final
 
 import mujoco
-from mujoco.batch import Batch
+import numpy as np
 
+from idbench.sim.part import AbstractCompiledPart
 from idbench.sim.robot.motors import Array
 from idbench.sim.robot.robot import Robot
 from idbench.sim.settings import EachNotNegativeOrNone, per_joint, settings
@@ -27,6 +28,36 @@ class AbstractContact(ABC):
         qd : Array, shape (nsim, joint)
             Speed in the middle of the step [rad/s].
         """
+
+
+class CompiledContact(AbstractCompiledPart, AbstractContact):
+    """A friction in C."""
+
+    _tau: Array | float = 0.0
+
+    def driven(self, tau: Array) -> None:
+        """Receive the torque of the drives."""
+        self._tau = tau
+
+    def torque(self, qd: Array) -> Array:
+        """Torque on the joints, as in the loop."""
+        return self.call_friction(np.asarray(self._tau), qd)
+
+
+class PlantJoints(Protocol):
+    """The joints of simulations in MuJoCo; arrays of shape (nsim, joint)."""
+
+    stride: int
+    """How far apart joints are in MuJoCo's arrays."""
+
+    def bind(self, name: str) -> Array:
+        """Return a field of the data, such as qpos, as it is whenever a friction is asked."""
+
+    def expand(self, name: str) -> Array:
+        """Return a field of the model, such as dof_frictionloss; what a friction writes into it holds."""
+
+    def addresses(self, name: str) -> list[int]:
+        """Where a field of the model or the data begins, in each simulation, for frictions in C."""
 
 
 @settings
@@ -61,12 +92,12 @@ class AbstractFrictionLaw(ABC):
         return {}
 
     @abstractmethod
-    def start(self, plant: Batch, Fs: Array, h: float) -> AbstractContact:
+    def start(self, plant: PlantJoints, Fs: Array, h: float) -> AbstractContact:
         """Return the friction of standing joints.
 
         Parameters
         ----------
-        plant : mujoco.batch.Batch
+        plant : PlantJoints
             The simulations, which have the friction that `edit` wrote.
         Fs : Array, shape (nsim, joint)
             Coulomb friction [N m] of every simulation.

@@ -4,13 +4,13 @@ from dataclasses import field, fields, is_dataclass
 from typing import Annotated, ClassVar
 
 import numpy as np
-from mujoco.batch import Batch
+import numpy.typing as npt
 from pydantic import Field
 
-from idbench.identify.basis import BLOCKS, AbstractFriction, Shape, ShapedFriction, StribeckFriction
+from idbench.identify.basis import BLOCKS, AbstractFriction, Shape, ShapedFriction
 from idbench.identify.basis.block import named
 from idbench.identify.basis.friction.shape import with_settings
-from idbench.sim.frictions.friction_law import AbstractContact, AbstractFrictionLaw
+from idbench.sim.frictions.friction_law import AbstractContact, AbstractFrictionLaw, CompiledContact, PlantJoints
 from idbench.sim.robot.motors import Array
 from idbench.sim.robot.robot import Robot
 from idbench.sim.settings import EachNotNegative, EachNumber, Number, Positive, per_joint, settings
@@ -27,14 +27,9 @@ class CoulombViscous(AbstractFrictionLaw):
 
     steady: ClassVar[bool] = True
 
-    def start(self, plant: Batch, Fs: Array, h: float) -> AbstractContact:
+    def start(self, plant: PlantJoints, Fs: Array, h: float) -> AbstractContact:
         """Return nothing more than MuJoCo's."""
-        return _CoulombContact()
-
-
-class _CoulombContact(AbstractContact):
-    def torque(self, qd: Array) -> Array | float:
-        return 0.0
+        return CompiledContact("coulomb", Fs.shape, ())
 
 
 @settings
@@ -51,10 +46,10 @@ class Stribeck(AbstractFrictionLaw):
         rise = (self.static - 1) * robot.model.dof_frictionloss
         return {named("Fst", j): float(x) for j, x in enumerate(rise)} | {named("vs", j): self.velocity for j in range(robot.n)}
 
-    def start(self, plant: Batch, Fs: Array, h: float) -> AbstractContact:
+    def start(self, plant: PlantJoints, Fs: Array, h: float) -> AbstractContact:
         """Return the law, which sets MuJoCo's Coulomb friction anew in every step: its constraint keeps standing joints."""
-        law = StribeckFriction(self.velocity)
-        return _LawContact(law, plant, Fs, (self.static - 1) * Fs)
+        rows = Fs, (self.static - 1) * Fs, self.velocity, SLOW
+        return _lossy("stribeck", plant, rows)
 
 
 @settings
@@ -79,7 +74,7 @@ class Law(AbstractFrictionLaw):
             found |= {named(shape.letters, j): float(getattr(self._force, shape.setting)) for j in range(n)}
         return found
 
-    def start(self, plant: Batch, Fs: Array, h: float) -> AbstractContact:
+    def start(self, plant: PlantJoints, Fs: Array, h: float) -> AbstractContact:
         """Return the law: where it jumps at rest MuJoCo's Coulomb friction, set anew in every step, keeps standing joints."""
         return _LawContact(self._force, plant, Fs, per_joint(self.size, Fs.shape[-1], "friction.size"))
 
@@ -102,7 +97,7 @@ class Law(AbstractFrictionLaw):
 
 
 class _LawContact(AbstractContact):
-    def __init__(self, law: AbstractFriction, plant: Batch, Fs: Array, size: Array) -> None:
+    def __init__(self, law: AbstractFriction, plant: PlantJoints, Fs: Array, size: Array) -> None:
         self._law = law
         self._Fs = Fs.copy()
         self._size = size
@@ -136,25 +131,13 @@ class Asymmetric(AbstractFrictionLaw):
         pairs = (("off", self._each("offset", robot.n)), ("Fva", self._each("difference", robot.n)))
         return {named(letters, j): float(x) for letters, values in pairs for j, x in enumerate(values)}
 
-    def start(self, plant: Batch, Fs: Array, h: float) -> AbstractContact:
+    def start(self, plant: PlantJoints, Fs: Array, h: float) -> AbstractContact:
         """Difference between the directions; MuJoCo makes the rest."""
         n = Fs.shape[-1]
-        return _AsymmetricContact(self._each("offset", n), self._each("difference", n), self.edge)
+        return CompiledContact("asymmetric", Fs.shape, (self._each("offset", n), self._each("difference", n), self.edge))
 
     def _each(self, name: str, n: int) -> Array:
         return per_joint(getattr(self, name), n, f"friction.{name}")
-
-
-class _AsymmetricContact(AbstractContact):
-    def __init__(self, offset: Array, difference: Array, edge: float) -> None:
-        self._offset = offset
-        self._difference = difference
-        self._edge = edge
-
-    def torque(self, qd: Array) -> Array | float:
-        speed = np.abs(qd)
-        found: Array = -self._offset * np.tanh(speed / self._edge) - self._difference * speed
-        return found
 
 
 @settings
@@ -171,26 +154,16 @@ class LoadDependent(AbstractFrictionLaw):
         """Return Fl."""
         return {named("Fl", j): float(x) for j, x in enumerate(per_joint(self.share, robot.n, "friction.share"))}
 
-    def start(self, plant: Batch, Fs: Array, h: float) -> AbstractContact:
+    def start(self, plant: PlantJoints, Fs: Array, h: float) -> AbstractContact:
         """Return the law, which sets MuJoCo's Coulomb friction anew in every step: its constraint keeps standing joints."""
-        return _LoadContact(plant, Fs, per_joint(self.share, Fs.shape[-1], "friction.share"))
+        return _lossy("load_dependent", plant, (Fs, per_joint(self.share, Fs.shape[-1], "friction.share")))
 
 
-class _LoadContact(AbstractContact):
-    def __init__(self, plant: Batch, Fs: Array, share: Array) -> None:
-        self._frictionloss = plant.expand("dof_frictionloss")
-        self._Fs = Fs.copy()
-        self._share = share
-        self._frictions = [plant.bind(f"qfrc_{name}") for name in ("passive", "constraint")]
-        self._tau = np.zeros(Fs.shape)
-
-    def driven(self, tau: Array) -> None:
-        """Receive what the joints carry, friction included."""
-        self._tau = tau
-
-    def torque(self, qd: Array) -> Array | float:
-        self._frictionloss[:] = self._Fs + self._share * np.abs(np.sum([self._tau, *self._frictions], axis=0))
-        return 0.0
+def _lossy(name: str, plant: PlantJoints, rows: tuple[npt.ArrayLike, ...]) -> CompiledContact:
+    """Return a friction in C that writes MuJoCo's Coulomb friction."""
+    shape, names = np.shape(rows[0]), ("dof_frictionloss", "qfrc_passive", "qfrc_constraint")
+    addresses = list(zip(*map(plant.addresses, names), strict=True))
+    return CompiledContact(name, (shape[0], shape[1]), rows, objects=addresses, stride=plant.stride)
 
 
 @settings
@@ -220,20 +193,7 @@ class Warming(AbstractFrictionLaw):
         """Return the temperature at instants t [s]."""
         return np.asarray(self.warm + (self.cold - self.warm) * np.exp(-np.asarray(t) / self.time))
 
-    def start(self, plant: Batch, Fs: Array, h: float) -> AbstractContact:
+    def start(self, plant: PlantJoints, Fs: Array, h: float) -> AbstractContact:
         """Friction that the temperature adds."""
-        return _TemperatureContact(self, per_joint(self.slope, Fs.shape[-1], "friction.slope"), h)
-
-
-class _TemperatureContact(AbstractContact):
-    def __init__(self, settings: Warming, slope: Array, h: float) -> None:
-        self._settings = settings
-        self._slope = slope
-        self._h = h
-        self._steps = 0
-
-    def torque(self, qd: Array) -> Array | float:
-        above = self._settings.at((self._steps + 0.5) * self._h) - self._settings.reference
-        self._steps += 1
-        found: Array = -self._slope * above * qd
-        return found
+        slope = per_joint(self.slope, Fs.shape[-1], "friction.slope")
+        return CompiledContact("warming", Fs.shape, (slope, self.reference, self.cold, self.warm, self.time, 0.0), h)

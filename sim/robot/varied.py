@@ -68,6 +68,15 @@ def vary_fields(batch: Batch, fields: Mapping[str, npt.ArrayLike]) -> None:
         batch.set_const()
 
 
+def varied_models(robot: Robot, nsim: int, fields: Mapping[str, npt.ArrayLike]) -> list[mujoco.MjModel]:
+    """MuJoCo's model of every simulation: the robot's own where no fields vary."""
+    if not fields:
+        return [robot.model] * nsim
+    batch = Batch(robot.model, nsim)
+    vary_fields(batch, fields)
+    return [batch.get_model(i) for i in range(nsim)]
+
+
 class VariedRobots(Sequence[Robot]):
     """Robots of which fields of MuJoCo's model vary, shape (nsim, ...), each made when it is asked for."""
 
@@ -82,9 +91,8 @@ class VariedRobots(Sequence[Robot]):
         if isinstance(place, slice):
             return [self[i] for i in self._places[place]]
         i = self._places[place]
-        one = Batch(self._robot.model, 1)
-        vary_fields(one, {name: np.asarray(values, dtype=np.float64)[i : i + 1] for name, values in self._vary.items()})
-        return Robot(self._robot.name, one.get_model(0))
+        own = {name: np.asarray(values, dtype=np.float64)[i : i + 1] for name, values in self._vary.items()}
+        return Robot(self._robot.name, varied_models(self._robot, 1, own)[0])
 
 
 def _set_link(robot: Robot, joint: int, values: Array, fields: dict[str, Array]) -> None:

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Annotated, Literal
 
 import numpy as np
@@ -46,6 +45,11 @@ class TorqueMeasurement:
         if self.cutoff and self.source == "reference":
             raise ScenarioError(f"cutoff = {self.cutoff:g} Hz needs source = 'current': a reference is not filtered")
 
+    @property
+    def recorded(self) -> Literal["command", "current"]:
+        """What of a simulation the log has."""
+        return "current" if self.source == "current" else "command"
+
     def spread(self, n: int) -> Array:
         """Return the standard deviation of the noise in the torques of `n` joints, that of the converter included [N m]."""
         noise, step = (per_joint(getattr(self, name), n, f"torque.{name}") for name in ("noise", "resolution"))
@@ -74,22 +78,6 @@ class TorqueMeasurement:
         tau = 1 / (2 * np.pi * self.cutoff) if self.cutoff else 0.0
         earlier = np.exp(-(T - r) / tau) / -np.expm1(-T / tau) if tau else 0.0
         return TorqueChannel("held", float(r - T * (1 + earlier) + lag))
-
-
-class CurrentSensor:
-    """A first-order anti-alias filter on the motor's torque-making current, advanced by times given in [s]."""
-
-    def __init__(self, settings: TorqueMeasurement, nsim: int, n: int) -> None:
-        self._rate = 2 * np.pi * settings.cutoff if settings.cutoff else np.inf
-        self.value: Array = np.zeros((nsim, n))
-
-    def take(self, tau: Array, dt: float) -> None:
-        """Take in the torques [N m], before ripple, of equal parts of the next `dt` [s], shape (part, nsim, joint)."""
-        if self._rate == np.inf:
-            self.value = tau[-1]
-            return
-        for part in tau:
-            self.value = part - (part - self.value) * np.exp(-self._rate * dt / len(tau))
 
 
 Harmonics = Annotated[tuple[Number, ...], Field(min_length=1)]
@@ -160,19 +148,3 @@ class RippleSeries:
     order: Array
     phase: Array
     harmonics: tuple[float, ...]
-
-    @cached_property
-    def still(self) -> bool:
-        """Whether it is zero everywhere."""
-        return not self.amplitude.any()
-
-    def at(self, q: Array) -> Array | float:
-        """Value at the positions q [rad] of rotors."""
-        if self.still:
-            return 0.0
-        angle = self.order * q + self.phase
-        first, *higher = self.harmonics
-        total = np.sin(angle) if first == 1 else first * np.sin(angle)
-        for k, share in enumerate(higher, 2):
-            total += share * np.sin(k * angle)
-        return self.amplitude * total

@@ -40,7 +40,7 @@ def test_a_table_loads_scipys_filters_and_no_figures(start, tmp_path):
     out, err = start("-c", code, cwd=tmp_path).communicate()
     loaded = set(out.splitlines()[-1].split())
     assert "scipy.signal" in loaded, err
-    assert not loaded & {"matplotlib", "numba", "idbench.identify.servo"}
+    assert not loaded & {"matplotlib", "idbench.identify.servo"}
 
 
 @pytest.mark.parametrize(
@@ -54,7 +54,7 @@ def test_a_table_loads_scipys_filters_and_no_figures(start, tmp_path):
     ids=lambda words: " ".join((words[0], *words[6:])) if isinstance(words, list) else "",
 )
 def test_fits_and_runs_load_no_more_than_they_use(start, tmp_path, words, most):
-    """SciPy's filters and distributions take half a second, figures a third, numba one; a tenth more than now is the most."""
+    """SciPy's filters and distributions take half a second, figures a third; a tenth more than now is the most."""
     robot = Robot.load("puma560")
     moves = RandomMoves(moves=6, durations=(0.8, 1.2), velocity=(2.0,), rest=0.2).sample(robot, 200.0)
     log = ideal_log(robot, moves)
@@ -63,6 +63,6 @@ def test_fits_and_runs_load_no_more_than_they_use(start, tmp_path, words, most):
     out, err = start("-c", code, cwd=tmp_path).communicate()
     loaded = set(out.splitlines()[-1].split())
     assert "idbench.sim" in loaded, err
-    assert not loaded & {"scipy.signal", "scipy.stats", "matplotlib", "numba"}
+    assert not loaded & {"scipy.signal", "scipy.stats", "matplotlib"}
     assert ("rerun" in loaded) == ("--out" in words)
     assert len(loaded) < most

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from idbench import models
-from idbench.sim.controllers import PID, ComputedTorque, PDFeedforward
+from idbench.sim.controllers import PID, AbstractController, AbstractLaw, ComputedTorque, PDFeedforward
 from idbench.sim.drives import AveragedDrive
 from idbench.sim.engine.simulation import simulate
 from idbench.sim.errors import ScenarioError
@@ -15,8 +15,9 @@ from idbench.sim.frictions import CoulombViscous, LuGre, Stribeck
 from idbench.sim.robot.payload import Payload
 from idbench.sim.robot.robot import Robot
 from idbench.sim.robot.scara import scara_truth
-from idbench.sim.scenario.measurement import CurrentSensor, Ripple, TorqueMeasurement
+from idbench.sim.scenario.measurement import Ripple, TorqueMeasurement
 from idbench.sim.scenario.scenario import Physics, Timing
+from idbench.sim.settings import settings
 from idbench.sim.trajectories import Quintic
 
 WAIT = Quintic(((0.3, 0.2), (0.3, 0.2)), (1.0,), 0.2)
@@ -197,20 +198,31 @@ def test_a_measured_current_is_the_command_of_the_period_before(short):
     assert run.log.torque.delay == pytest.approx(-0.01)
 
 
+RISE = 1e-4  # Torque by which each command is above the one before [N m]: too small to move a joint
+
+
+class RampLaw(AbstractLaw):
+    def command(self, k, q):
+        return np.full(q.shape, RISE * k)
+
+
+@settings
+class Ramp(AbstractController):
+    """Commands a torque that rises."""
+
+    def start(self, task):
+        return RampLaw()
+
+
 @pytest.mark.parametrize("cutoff", [20.0, 100.0, 1000.0])
 @pytest.mark.parametrize("delay", [0.0, 0.0035, 0.012])
-def test_a_filtered_current_states_its_mean_delay(cutoff, delay):
+def test_a_filtered_current_states_its_mean_delay(short, cutoff, delay):
     """A ramp of commands: what the sensor says is the command of `delay` later, and the channel knows it."""
-    settings, T, h = TorqueMeasurement(source="current", cutoff=cutoff), 0.01, 1e-4
-    sensor, said = CurrentSensor(settings, 1, 1), []
-    for step in range(10000):
-        if step % 100 == 0:
-            said.append(sensor.value[0, 0])
-        sensor.take(np.array([[[np.floor((step * h - delay + 1e-9) / T)]]]), h)  # command k has the value k
-    channel = settings.channel(delay, 0.0, 100.0)
+    torque = TorqueMeasurement(source="current", cutoff=cutoff)
+    run = simulate(replace(short, torque=torque, timing=Timing(delay=delay), controller=Ramp(), physics=Physics(step=5e-4)))
     # Sample k speaks for the command u_i with t_i + delay = t_k + channel.delay.
-    expected = np.arange(100) + (channel.delay - delay) / T
-    np.testing.assert_allclose(said[60:], expected[60:], atol=1e-6)
+    expected = RISE * (np.arange(run.log.samples) + (torque.channel(delay, 0.0, 100.0).delay - delay) / 0.01)
+    np.testing.assert_allclose(run.log.tau[0, 60:, 0], expected[60:], atol=1e-6 * RISE)
 
 
 def test_the_arm_is_brought_to_the_start_before_the_log_begins(short):

@@ -9,13 +9,16 @@ from idbench.identify import scara
 from idbench.identify.judge.delay import estimate_delay
 from idbench.sim.controllers import CONTROLLERS, ComputedTorque, PDFeedforward
 from idbench.sim.drives import AveragedDrive, ServoDrive, SwitchedDrive
+from idbench.sim.drives.drive import AbstractAmplifier, AbstractDrive
 from idbench.sim.encoders import IncrementalEncoder
 from idbench.sim.engine.simulation import simulate
 from idbench.sim.errors import ScenarioError
 from idbench.sim.frictions import LuGre, Stribeck
+from idbench.sim.frictions.friction_law import AbstractContact, AbstractFrictionLaw
 from idbench.sim.robot.scara import scara_truth
 from idbench.sim.scenario.measurement import Ripple, TorqueMeasurement
 from idbench.sim.scenario.scenario import Physics, Timing
+from idbench.sim.settings import settings
 from idbench.sim.trajectories import Quintic, RandomMoves
 
 BUSY = {
@@ -116,51 +119,57 @@ def test_a_loop_that_runs_away_without_a_range_fails_quietly(ideal, tmp_path, mo
     assert [path.name for path in tmp_path.iterdir()] == ["free.xml"]
 
 
-def test_an_error_of_mujoco_ends_its_simulation_alone(short, monkeypatch):
-    """MuJoCo raises in the second of three, after a while; the others have the bits that they have alone."""
-    import idbench.sim.engine.plant
-
-    class Failing(idbench.sim.engine.plant.Batch):
-        calls = 0
-
-        def step(self, ids=None, nstep=1, **kwargs):
-            super().step(ids, nstep, **kwargs)
-            self.calls += 1
-            if self.calls == 50 and self.nsim == 3:
-                raise idbench.sim.engine.plant.SimulationError(np.array([1]), "mj_step: stack overflow")
-
-        def error(self, sim):
-            return "mj_step: stack overflow"
-
-    alone = simulate(short, (7,))
-    monkeypatch.setattr(idbench.sim.engine.plant, "Batch", Failing)
-    run = simulate(replace(short), (3, 5, 7), throw=False)
-    assert run.failures == {1: "MuJoCo cannot go on: mj_step: stack overflow (seed 5)"}
-    np.testing.assert_array_equal(run.log.tau[2], alone.log.tau[0])
+def sick(torques, calls):
+    """Torques of which those of joint 1 of the second simulation have no size after 40 calls."""
+    calls.append(1)
+    torques = np.array(torques)
+    if len(calls) > 40:
+        torques[..., 1, 0] = np.nan
+    return torques
 
 
-@pytest.mark.parametrize(("part", "message"), [("drive", "the drive gives"), ("friction", "the friction gives")])
-def test_a_torque_that_is_not_finite_is_blamed_on_its_part(short, monkeypatch, part, message):
-    import idbench.sim.drives.ideal_drive
-    import idbench.sim.frictions.static
+class SickDrive(AbstractAmplifier):
+    def __init__(self):
+        self.calls = []
 
-    owner, name = {
-        "drive": (idbench.sim.drives.ideal_drive._Amplifier, "step"),
-        "friction": (idbench.sim.frictions.static._CoulombContact, "torque"),
-    }[part]
-    before, calls = getattr(owner, name), []
+    def step(self, demand, speed, steps):
+        return sick(demand[None], self.calls)
 
-    def broken(self, x, *others):
-        calls.append(1)
-        found = before(self, x, *others)
-        if len(calls) > 40:
-            found = np.broadcast_to(found, (1, 2, 2) if part == "drive" else (2, 2)).copy()
-            found[..., 1, 0] = np.nan
-        return found
+    def electric(self, trace, dt):
+        raise AssertionError("nobody watches")
 
-    monkeypatch.setattr(owner, name, broken)
-    run = simulate(short, (3, 5), throw=False)
-    assert run.failures == {1: f"{message} no finite torque (seed 5)"}
+
+class SickContact(AbstractContact):
+    def __init__(self):
+        self.calls = []
+
+    def torque(self, qd):
+        return sick(np.zeros_like(qd), self.calls)
+
+
+@settings
+class SickFriction(AbstractFrictionLaw):
+    """Breaks after a while."""
+
+    def start(self, plant, Fs, h):
+        return SickContact()
+
+
+@settings
+class SickMotors(AbstractDrive):
+    """Breaks after a while."""
+
+    def start(self, robot, nsim, h):
+        return SickDrive()
+
+    def lag(self, robot):
+        return np.zeros(robot.n)
+
+
+@pytest.mark.parametrize(("part", "made"), [("drive", SickMotors()), ("friction", SickFriction())])
+def test_a_torque_that_is_not_finite_is_blamed_on_its_part(short, part, made):
+    run = simulate(replace(short, **{part: made}), (3, 5), throw=False)
+    assert run.failures == {1: f"the {part} gives no finite torque (seed 5)"}
 
 
 def test_progress_is_told_about_a_hundred_times_and_grows(short):

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from idbench.identify.errors import InvariantError
+from idbench.sim.engine.batched import BatchedPlant
 from idbench.sim.engine.driven import free_run, physics_of, replays
-from idbench.sim.engine.plant import Plant
 from idbench.sim.engine.simulation import simulate
 from idbench.sim.errors import RobotError
 from idbench.sim.robot.robot import Robot
@@ -73,7 +73,7 @@ def test_logs_of_other_instants_are_refused_and_other_bodies_are_simulated_alone
     with pytest.raises(InvariantError, match="same instants"):
         replays([Robot.load("scara")] * 2, [log, log.part(0, 100)], qd, 5.0)
     with pytest.raises(RobotError, match="more than parameters"):
-        Plant(Robot.load("scara"), 2, Physics(), 1e-3, {}, 1).become([Robot.load("scara"), Robot.load("two_link")])
+        BatchedPlant(Robot.load("scara"), 2, Physics(), 1e-3, {}, 1).become([Robot.load("scara"), Robot.load("two_link")])
     one, other = replays([Robot.load("scara"), Robot.load("two_link")], [log] * 2, qd, 5.0)
     np.testing.assert_array_equal(one, replays([Robot.load("scara")], [log], qd, 5.0)[0])
     assert isinstance(other, str) or not np.array_equal(other, one)

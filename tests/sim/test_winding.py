@@ -8,13 +8,13 @@ from scipy.integrate import solve_ivp
 
 from idbench.sim.drives import SwitchedDrive
 from idbench.sim.drives.pwm import Modulator, pieces
-from idbench.sim.drives.switched_drive import ExactPassages, TabulatedPassages
-from idbench.sim.drives.winding import Loops, Winding, Windings, pass_period, stretches
+from idbench.sim.drives.switched_drive import ExactPeriods, TabulatedPeriods
+from idbench.sim.drives.winding import Winding, pass_period, stretches
 from idbench.sim.engine.simulation import simulate
 from idbench.sim.robot.robot import Robot
 from idbench.sim.scenario.measurement import Ripple
 from idbench.sim.scenario.scenario_file import load
-from idbench.sim.trajectories import RandomMoves
+from idbench.sim.trajectories import Quintic
 
 V, R, L, T = 160.0, 3.0, 0.012, 2e-4
 INDEX = np.linspace(-0.96, 0.96, 49)
@@ -112,29 +112,26 @@ def test_dead_time_takes_voltage_from_the_current_it_meets():
         np.testing.assert_allclose(charge / T * R + e - m * V, [-2 * V * 1e-6 / T, 2 * V * 1e-6 / T], rtol=1e-6)
 
 
-def loops(shape, most=0.9 * V):
-    one = np.ones(shape)
-    return Loops(20.0 * one, 2.0 * one, most * one, 0.8)
-
-
 @pytest.mark.parametrize("modulation", ["unipolar", "bipolar", "sign_magnitude"])
 @pytest.mark.parametrize("dead_time", [0.0, 520e-9])
-def test_tabulated_periods_are_those_that_are_computed(modulation, dead_time, rng):
+def test_tabulated_periods_are_those_that_are_computed(modulation, dead_time, rng, robot):
     """Through limits, reversals of the current and dead times; to rounding, of coefficients that are differences of V/R."""
-    shape, modulator = (8, 2), Modulator(modulation, T, dead_time)
-    kinds = [kind(winding(shape), modulator, 0.002) for kind in (ExactPassages, TabulatedPassages)]
-    wanted, emf = rng.uniform(-8, 8, (40, *shape)) * rng.choice([0.02, 1.0], shape), rng.uniform(-30, 30, (40, 5, *shape))
-    states = [Windings(*np.zeros((2, *shape))) for _ in kinds]
+    settings, motors = SwitchedDrive(modulation=modulation, dead_time=dead_time, emf_compensation=0.8), robot.motors
+    exact, other = (ExactPeriods(settings, motors, motors.V, np.full(2, 30.0), 8, T) for _ in range(2))
+    tabulated = TabulatedPeriods(other)
+    size = rng.choice([0.02, 1.0], (8, 2))
+    wanted, speeds = rng.uniform(-8, 8, (40, 8, 2)) * size * motors.K, rng.uniform(-30, 30, (40, 5, 8, 2)) / motors.K
     turned = limited = False
-    for u, e in zip(wanted, emf, strict=True):
-        exact, tabulated = (kind.advance(loops(shape), state, u, e) for kind, state in zip(kinds, states, strict=True))
-        np.testing.assert_allclose(tabulated, exact, atol=1e-11 * max(1.0, np.abs(exact).max()))
-        turned |= (exact[1] * exact[2] < 0).any()
-        limited |= (np.abs(exact[3]) > 0.89).any()
+    for u, speed in zip(wanted, speeds, strict=True):
+        for one in (exact, tabulated):
+            one.step(u, speed, 5)
+        for a, b in zip(tabulated.trace, exact.trace, strict=True):
+            np.testing.assert_allclose(a, b if len(b) == len(a) else b[:1], atol=1e-10 * max(1.0, np.abs(b).max()))
+        _, _, before, after, _, index = exact.trace
+        turned |= (before * after < 0).any()
+        limited |= (np.abs(index) > 0.89).any()
     assert turned
     assert limited
-    for exact, tabulated in zip(*states, strict=True):
-        np.testing.assert_allclose(tabulated, exact, atol=1e-10 * np.abs(exact).max())
 
 
 @pytest.mark.parametrize("resolution", [0.001, 0.0])
@@ -164,7 +161,7 @@ def test_a_bipolar_chopper_whose_current_is_sampled_between_pulses_gives_more_th
     """
     base = load("ripple")
     drive = replace(base.drive, dead_time=0.0, duty_resolution=0.0)
-    still = RandomMoves(moves=1, durations=(0.5, 0.5), velocity=(0.01,), rest=0.5, seed=0)
+    still = Quintic(((0.0, 0.0), (0.005, 0.005)), (0.5,), 0.5)
     made = simulate(replace(base, ripple=Ripple(), drive=drive, trajectory=still))
     motors = made.robots[0].motors
     tau_e, T = motors.L / motors.R, 1 / drive.pwm

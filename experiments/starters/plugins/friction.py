@@ -1,9 +1,8 @@
 """A friction of the simulated robot: how its joints resist beside MuJoCo's own Coulomb and viscous friction."""
 
 import numpy as np
-from mujoco.batch import Batch
 
-from idbench.sim.frictions.friction_law import AbstractContact, AbstractFrictionLaw
+from idbench.sim.frictions.friction_law import AbstractContact, AbstractFrictionLaw, PlantJoints
 from idbench.sim.robot.motors import Array
 from idbench.sim.settings import NotNegative, settings
 
@@ -15,7 +14,7 @@ class Starter(AbstractFrictionLaw):
     drag: NotNegative = 0.01
     """Fq [N m s^2/rad^2], of all joints."""
 
-    def start(self, plant: Batch, Fs: Array, h: float) -> AbstractContact:
+    def start(self, plant: PlantJoints, Fs: Array, h: float) -> AbstractContact:
         """Return the friction at work."""
         return _Contact(self.drag)
 
