@@ -8,6 +8,7 @@ import shutil
 import subprocess
 import sys
 import sysconfig
+import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -51,12 +52,14 @@ class CustomBuildHook(BuildHookInterface):  # type: ignore[type-arg]  # its name
         root, target = Path(self.root), PLATFORMS[self._platform] if self._platform else None
         kind = self._platform or {"win32": "win", "darwin": "macosx"}.get(sys.platform, "linux")
         suffix = {"w": ".dll", "m": ".dylib", "l": ".so"}["l" if kind.startswith("manylinux") else kind[0]]
-        out = root / "src" / "idbench" / ("compiled" + suffix)
+        # What is for another platform must not replace what this one uses.
+        folder = Path(tempfile.mkdtemp()) if target else root / "src" / "idbench"
+        out = folder / ("compiled" + suffix)
         sources = sorted(str(path) for room in ("identify", "sim") for path in (root / room).rglob("*.c"))
         zig = [sys.executable, "-m", "ziglang", "cc", *(["-target", target] if target else [])]
         command = [*(compiler(target) or zig), *FLAGS, *sources, "-o", str(out), *([] if suffix == ".dll" else ["-lm"])]
         newest = max(path.stat().st_mtime for path in [Path(__file__), *map(Path, sources), *(root / "sim").rglob("*.h")])
-        if self._platform or not out.exists() or out.stat().st_mtime < newest:
+        if not out.exists() or out.stat().st_mtime < newest:
             subprocess.run(command, check=True)
         tag = self._platform or sysconfig.get_platform().replace("-", "_").replace(".", "_")
         build_data["pure_python"], build_data["tag"] = False, f"py3-none-{tag}"
