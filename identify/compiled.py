@@ -6,7 +6,6 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import numpy.typing as npt
 
 from idbench.identify.errors import IdentificationError
@@ -46,7 +45,3 @@ def pointer(array: npt.NDArray[Any] | None) -> int | None:
     if array is not None and not array.flags.c_contiguous:
         raise AssertionError("compiled code takes contiguous arrays")
     return None if array is None else array.ctypes.data
-
-
-Numbers = np.ctypeslib.ndpointer(np.float64, flags="C_CONTIGUOUS")
-"""An argument that is an array of numbers."""

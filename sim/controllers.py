@@ -12,7 +12,7 @@ import numpy.typing as npt
 from idbench.identify.compiled import pointer
 from idbench.identify.plugins import PluginTable
 from idbench.sim.drives.drive import Commanded
-from idbench.sim.part import AbstractCompiledPart, mujoco_function
+from idbench.sim.part import AbstractCompiledPart, Addresses, mujoco_function
 from idbench.sim.robot.inverse_dynamics import InverseDynamics, inverse_dynamics
 from idbench.sim.robot.motors import Array
 from idbench.sim.robot.robot import Robot
@@ -171,29 +171,17 @@ class ComputedTorque(AbstractClosedLoop):
     def start(self, task: Task) -> AbstractLaw:
         """Return the law."""
         w, planned = per_joint(self.bandwidth, task.nominal.n, "controller.bandwidth"), task.reference
-        robots = NominalRobots(task)
-        gains = w**2, 2 * self.damping * w, self.cutoff, 1 + self.model_error
-        law = _law("computed_torque", task, *gains, signals=(planned.qd, planned.qdd), objects=robots.addresses)
-        law.robots = robots
-        return law
-
-
-class NominalRobots:
-    """The nominal robot of every simulation in MuJoCo, as C takes it."""
-
-    def __init__(self, task: Task) -> None:
-        self.models = varied_models(task.nominal, task.nsim, task.vary)
-        self.datas = [mujoco.MjData(model) for model in self.models]
-
-    @property
-    def addresses(self) -> list[list[int]]:
-        """Functions, structures and arrays, in the order of controllers.c."""
+        models = varied_models(task.nominal, task.nsim, task.vary)
+        datas = [mujoco.MjData(model) for model in models]
         functions = [mujoco_function(name) for name in ("mj_fwdPosition", "mj_fwdVelocity")]
-        return [
+        robots = [
             [*functions, m._address, d._address]
             + [pointer(x) or 0 for x in (d.qpos, d.qvel, d.M, d.qfrc_bias, d.qfrc_passive, m.M_rownnz, m.M_colind)]
-            for m, d in zip(self.models, self.datas, strict=True)
+            for m, d in zip(models, datas, strict=True)
         ]
+        gains = w**2, 2 * self.damping * w, self.cutoff, 1 + self.model_error
+        signals = planned.qd, planned.qdd
+        return _law("computed_torque", task, *gains, signals=signals, objects=Addresses(robots, (models, datas)))
 
 
 @settings
@@ -210,9 +198,6 @@ class PositionCommand(AbstractController):
 class CompiledLaw(AbstractCompiledPart, AbstractLaw):
     """A controller in C."""
 
-    robots: NominalRobots | None = None
-    """What it knows of the robots, if it asks MuJoCo."""
-
     def command(self, k: int, q: Array) -> Array:
         """Command of a sample, as in the loop."""
         return self.call_sampled(k, q)
@@ -226,7 +211,7 @@ def _law(
     cutoff: float,
     *others: npt.ArrayLike,
     signals: Sequence[Array] = (),
-    objects: Sequence[Sequence[int]] = (),
+    objects: Addresses | None = None,
 ) -> CompiledLaw:
     """Return a law of the control error and its rate behind a low-pass [Hz]."""
     fs = task.reference.fs

@@ -4,7 +4,7 @@ import ctypes
 from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -30,6 +30,15 @@ class Part(ctypes.Structure):
     )
 
 
+class Addresses(NamedTuple):
+    """Where in memory a part finds what it needs."""
+
+    each: Sequence[Sequence[int]]
+    """For each simulation, in the order of its function."""
+    owner: object
+    """What has the memory, and must outlive the part."""
+
+
 class AbstractCompiledPart:
     """A part of simulations that a function in C makes, by itself for each of them.
 
@@ -45,8 +54,8 @@ class AbstractCompiledPart:
         Physics step [s].
     signals : sequence of Array or None
         Of shape (1 or nsim, sample, joint), in the order of the function.
-    objects : sequence of array_like
-        Addresses for each simulation.
+    objects : Addresses, optional
+        What else it reads and writes.
     stride : int
         How far apart the joints are in MuJoCo's arrays.
     """
@@ -58,20 +67,20 @@ class AbstractCompiledPart:
         rows: Sequence[npt.ArrayLike],
         h: float = 0.0,
         signals: Sequence[Array | None] = (),
-        objects: Sequence[Sequence[int]] = (),
+        objects: Addresses | None = None,
         stride: int = 1,
     ) -> None:
         nsim, n = shape
         each = [np.broadcast_to(np.asarray(row, dtype=np.float64), shape) for row in rows]
         self.x = np.ascontiguousarray(np.stack(each or [np.zeros(shape)], axis=1))
         self._signals = [None if s is None else np.ascontiguousarray(s) for s in signals]
-        self._objects = np.array(objects or [[0]] * nsim, dtype=np.uint64)
-        self.run, self._shape = ctypes.cast(library()[name], ctypes.c_void_p).value, shape
+        self._kept, self._objects = objects, np.array(objects.each if objects else [[0]] * nsim, dtype=np.uint64)
+        run, self._shape = ctypes.cast(library()[name], ctypes.c_void_p).value, shape
         self._name, self.parts = name, (Part * nsim)()
         for i, part in enumerate(self.parts):
             own = [None if s is None else pointer(s[i if len(s) > 1 else 0]) for s in self._signals]
             signals_of = (ctypes.c_void_p * SIGNALS)(*own)
-            part.__init__(self.run, n, stride, h, pointer(self.x[i]), signals_of, pointer(self._objects[i]))
+            part.__init__(run, n, stride, h, pointer(self.x[i]), signals_of, pointer(self._objects[i]))
 
     def call_sampled(self, k: int, q: Array) -> Array:
         """What an encoder or controller makes of positions [rad] at sample `k`, shape (nsim, joint)."""

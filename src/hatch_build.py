@@ -38,7 +38,10 @@ class CustomBuildHook(BuildHookInterface):  # type: ignore[type-arg]  # its name
 
     @property
     def _platform(self) -> str | None:
-        return os.environ.get("IDBENCH_PLATFORM")
+        platform = os.environ.get("IDBENCH_PLATFORM") or None
+        if platform and platform not in PLATFORMS:
+            raise SystemExit(f"IDBENCH_PLATFORM = {platform!r} must be one of {', '.join(PLATFORMS)}")
+        return platform
 
     def dependencies(self) -> list[str]:
         """What building needs beside hatchling."""

@@ -11,6 +11,7 @@ from idbench.sim.drives.drive import AbstractAmplifier, AbstractCompiledAmplifie
 from idbench.sim.drives.pwm import Modulation, Modulator, pieces
 from idbench.sim.drives.winding import Winding, pass_period, straight, stretches
 from idbench.sim.errors import ScenarioError
+from idbench.sim.part import Addresses
 from idbench.sim.robot.motors import Array, Motors
 from idbench.sim.robot.robot import Robot
 from idbench.sim.settings import EachPositiveOrNone, NotNegative, Number, Positive, Share, settings
@@ -160,7 +161,7 @@ class TabulatedPeriods(AbstractCompiledAmplifier):
         table = [*map(pointer, (self._linear, self._pieces)), len(indices), self._linear.shape[-1], len(cut.duration)]
         rows = exact.K, V, R, L, exact.I, exact.kp, exact.ki, exact.most, exact.known, exact.least, highest
         dead, shape = bool(exact.modulator.dead_time), (len(V), V.shape[-1])
-        super().__init__("switched_drive", shape, (*rows, dead, 0.0, 0.0), exact.h, objects=[table] * len(V))
+        super().__init__("switched_drive", shape, (*rows, dead, 0.0, 0.0), exact.h, objects=Addresses([table] * len(V), self))
 
     def _functions(self, indices: Array) -> Array:
         """Charge and the currents at edges, (sign, value, joint) -> (constant, by i, by e) x quantity."""

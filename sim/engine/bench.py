@@ -15,9 +15,11 @@ from idbench.identify.data.motion_log import MotionLog
 from idbench.sim.controllers import AbstractLaw, Task
 from idbench.sim.drives.drive import AbstractAmplifier, AbstractCompiledAmplifier
 from idbench.sim.encoders import AbstractReader
+from idbench.sim.engine import loop as c
 from idbench.sim.engine.clock import Clock
 from idbench.sim.engine.failures import ADVICE, Bounds
-from idbench.sim.engine.plant import STATE, Plant, SteppedBody
+from idbench.sim.engine.loop import CHANNELS, Loop, series
+from idbench.sim.engine.plant import Plant
 from idbench.sim.engine.run import Run
 from idbench.sim.engine.watch import Watcher
 from idbench.sim.errors import ScenarioError
@@ -28,7 +30,6 @@ from idbench.sim.robot.motors import Array
 from idbench.sim.robot.payload import with_play
 from idbench.sim.robot.robot import Robot
 from idbench.sim.robot.varied import VariedRobots, varied_models
-from idbench.sim.scenario.measurement import RippleSeries
 from idbench.sim.scenario.scenario import Scenario
 from idbench.sim.trajectories import Reference
 
@@ -37,40 +38,6 @@ NOISE = 2  # Stream of random numbers of the torque's noise
 BLOCK = 1e-3
 """Time [s] over which the motion of the rotors may be predicted, for back-EMF and ripple: with a jerk of 1000 rad/s^3 they are
 then off by 2e-7 rad and 5e-4 rad/s."""
-
-READ, COMMAND, DRIVE, RESIST = range(1, 5)  # Where the loop stops for a part in Python (loop.c)
-
-STEP, SAMPLE, STEPS, ROWS, TORQUES, TRACED, BEFORE_STEPS = 0, 2, 3, 4, 5, 7, 8  # Whole numbers that it remembers
-
-BEFORE, COMMANDED, DEMAND, THEN, MEASURED, RESISTANCE = 0, 1, 2, 5, 6, 7  # What it remembers of each joint, of 8
-
-SEEN, MIDDLE_QD, TURNING, ELECTRIC, TAU = 2, 1, 4, 5, 6  # Of each joint in each step to come, of 8
-
-CHANNELS = ("measured", "command", "current", "q", "qd", "tau", "gap")  # What it records
-
-
-class Series(ctypes.Structure):
-    """A ripple."""
-
-    _fields_ = (*((x, ctypes.c_void_p) for x in ("amplitude", "order", "phase", "harmonics")), ("count", ctypes.c_int64))
-
-
-WHOLE = ("n", "samples", "per_sample", "late", "most", "steady", "smooth", "sees_rotor", "signals", "ring")
-
-ARRAYS = ("offsets", "q_ring", "qd_ring", "now", "rows", "records", "drawn", "trace", "numbers")
-
-
-class Loop(ctypes.Structure):
-    """The closed loop of one simulation (loop.c)."""
-
-    _fields_ = (
-        ("body", SteppedBody),
-        *((name, ctypes.c_int64) for name in WHOLE),
-        *((name, ctypes.c_double) for name in ("old", "h", "filter")),
-        *((name, ctypes.POINTER(Part)) for name in ("encoder", "law", "drive", "friction")),
-        *((name, Series) for name in ("cogging", "commutation")),
-        *((name, ctypes.c_void_p) for name in ARRAYS),
-    )
 
 
 class Bench:
@@ -106,9 +73,9 @@ class Bench:
         self.failures = dict[int, str]()
         self._most = self._longest()
         self.numbers = self._plant.numbers
-        self.numbers[:, BEFORE_STEPS] = 1
-        self._now, self._rows = np.zeros((nsim, 8, n)), np.zeros((nsim, 8, self._most, n))
-        self._now[:, [BEFORE, COMMANDED, DEMAND]] = _holding(scenario, robot, planned, nsim, vary)[:, None]
+        self.numbers[:, c.BEFORE_STEPS] = 1
+        self._now, self._rows = np.zeros((nsim, c.RESISTANCE + 1, n)), np.zeros((nsim, c.TOTAL + 1, self._most, n))
+        self._now[:, [c.BEFORE, c.COMMANDED, c.DEMAND]] = _holding(scenario, robot, planned, nsim, vary)[:, None]
         self._records = np.zeros((nsim, len(CHANNELS), samples, n))
         self._traces = list[tuple[Array, ...]]()
         self._loops = self._looped(samples)
@@ -132,16 +99,16 @@ class Bench:
         offsets = self._drawn_jitter(samples) if timing.jitter or timing.refresh else None
         self._kept = kept = np.zeros((2, len(self._seeds), reach, n)), offsets, np.zeros((self._most, signals, n))
         kinds, cutoff = (scenario.drive.steady and smooth, smooth, scenario.drive.before_gear), scenario.torque.cutoff
-        whole = n, samples, clock.per_sample, clock.late, self._most, *kinds, signals, reach
+        whole = samples, clock.per_sample, clock.late, self._most, *kinds, signals, reach
         numbers = *whole, clock.old, self._h, 2 * np.pi * cutoff if cutoff else np.inf
-        self._series = [_series(ripple) for ripple in self._ripples]
+        self._series = [series(ripple) for ripple in self._ripples]
         every = self._encoder, self._law, drive, self._friction
         parts = [x.parts if isinstance(x, AbstractCompiledPart) else None for x in every]
-        python = Part(None, n)
+        python = self._python = Part(None, n)
         loops = (Loop * len(self._seeds))()
         for i, loop in enumerate(loops):
             own = [None if offsets is None else offsets[i], *kept[0][:, i], self._now[i], self._rows[i], self._records[i]]
-            pointers = [*map(pointer, own), pointer(kept[2]), None, pointer(self.numbers[i])]
+            pointers = [*map(pointer, own), pointer(kept[2]), None]
             each = [ctypes.pointer(python if x is None else x[i]) for x in parts]
             loop.__init__(self._plant.bodies[i], *numbers, *each, *(x for x, _ in self._series), *pointers)
         return loops
@@ -169,34 +136,35 @@ class Bench:
         """Advance to before physics step `until`; `shares` calls a function with shares of simulations."""
         watcher, run = self._watcher, function("run_loops", ctypes.c_void_p, *[ctypes.c_int64] * 2, result=ctypes.c_int64)
         if watcher:
-            rows = until - int(self.numbers[0, STEP]) + self._most
+            rows = until - int(self.numbers[0, c.STEP]) + self._most
             trace = np.empty((rows, 3 + (1 + self._loops[0].signals) * self._plant.n))
-            self._loops[0].trace, self.numbers[0, TRACED] = pointer(trace), 0
+            self._loops[0].trace, self.numbers[0, c.TRACED] = pointer(trace), 0
         while stops := shares(lambda first, count: run(ctypes.addressof(self._loops[first]), count, until)):
             self._count_failed()
             if not any(stops):
                 break
-            {READ: self._read, COMMAND: self._order, DRIVE: self._drive_on, RESIST: self._resist}[max(stops)]()
+            {c.READ: self._read, c.COMMAND: self._order, c.DRIVE: self._drive_on, c.RESIST: self._resist}[max(stops)]()
         if watcher:
-            watcher.take(trace[: self.numbers[0, TRACED]], self._traces)
+            watcher.take(trace[: self.numbers[0, c.TRACED]], self._traces)
             self._traces = []
 
     def _read(self) -> None:
-        q = self._encoder.read(self._sample, self._now[:, THEN].copy())
-        self._now[:, MEASURED] = expect(self._encoder, "read", q, self._each)
+        q = self._encoder.read(self._sample, self._now[:, c.THEN].copy())
+        self._now[:, c.MEASURED] = expect(self._encoder, "read", q, self._each)
 
     def _order(self) -> None:
-        u = self._law.command(self._sample, self._now[:, MEASURED].copy())
-        self._now[:, COMMANDED] = expect(self._law, "command", u, self._each)
+        u = self._law.command(self._sample, self._now[:, c.MEASURED].copy())
+        self._now[:, c.COMMANDED] = expect(self._law, "command", u, self._each)
 
     def _drive_on(self) -> None:
-        steps, rows = self.numbers[self._going, [[STEPS], [ROWS]]][:, 0].tolist()
-        demand, (seen, speed) = self._now[:, DEMAND].copy(), self._rows[:, [SEEN, TURNING], :rows].transpose(1, 2, 0, 3).copy()
+        steps, rows = self.numbers[self._going, [[c.STEPS], [c.ROWS]]][:, 0].tolist()
+        demand = self._now[:, c.DEMAND].copy()
+        seen, speed = self._rows[:, [c.SEEN, c.TURNING], :rows].transpose(1, 2, 0, 3).copy()
         self._drive.sees(seen)
         electric = self._drive.step(demand, speed, steps)
         expect(self._drive, "step", electric, (1, *self._each), (steps, *self._each))
-        self._rows[:, ELECTRIC, : len(electric)] = electric.swapaxes(0, 1)
-        self.numbers[:, TORQUES] = len(electric)
+        self._rows[:, c.ELECTRIC, : len(electric)] = electric.swapaxes(0, 1)
+        self.numbers[:, c.TORQUES] = len(electric)
         if self._watcher and self._drive.trace:
             rows = len(electric) if self._scenario.ripple.steady else max(rows, len(electric))
             each = (x[0][None] if x.ndim == 2 else x[:, 0] for x in self._drive.trace)
@@ -204,19 +172,19 @@ class Bench:
 
     def _resist(self) -> None:
         self._plant.before_friction()
-        self._friction.driven(self._rows[:, TAU, 0].copy())
-        resistance = self._friction.torque(self._rows[:, MIDDLE_QD, 0].copy())
-        self._now[:, RESISTANCE] = expect(self._friction, "torque", np.asarray(resistance), (), self._each)
+        self._friction.driven(self._rows[:, c.TAU, 0].copy())
+        resistance = self._friction.torque(self._rows[:, c.MIDDLE_QD, 0].copy())
+        self._now[:, c.RESISTANCE] = expect(self._friction, "torque", np.asarray(resistance), (), self._each)
         self._plant.after_friction()
 
     @property
     def _going(self) -> int:
         """A simulation that goes on: all of them are at the same place."""
-        return int(np.argmin(self.numbers[:, STATE] != 0))
+        return int(np.argmin(self.numbers[:, c.STATE] != 0))
 
     @property
     def _sample(self) -> int:
-        return int(self.numbers[self._going, SAMPLE])
+        return int(self.numbers[self._going, c.SAMPLE])
 
     @property
     def _each(self) -> tuple[int, int]:
@@ -224,10 +192,10 @@ class Bench:
 
     def _count_failed(self) -> None:
         """Say why simulations cannot go on that have stopped; MuJoCo keeps their last state."""
-        for sim in np.flatnonzero(self.numbers[:, STATE]).tolist():
+        for sim in np.flatnonzero(self.numbers[:, c.STATE]).tolist():
             if sim in self.failures:
                 continue
-            plant, t = self._plant, self.numbers[sim, STEP] * self._h
+            plant, t = self._plant, self.numbers[sim, c.STEP] * self._h
             why, advice = self._bounds.broken(sim, plant.q[sim], plant.qd[sim]), f": {ADVICE}"
             why = f"{why} {t:.3g} s after the start" if why else ""
             if not why and (trouble := plant.trouble(sim)):
@@ -238,8 +206,8 @@ class Bench:
 
     def _broken_part(self, sim: int) -> str:
         """The first part whose torque has no size."""
-        rows = self._rows[sim, TAU, : self.numbers[sim, ROWS]]
-        torques = {"the controller": self._now[sim, DEMAND], "the drive": rows, "the friction": self._now[sim, RESISTANCE]}
+        rows = self._rows[sim, c.TAU, : self.numbers[sim, c.ROWS]]
+        torques = {"the controller": self._now[sim, c.DEMAND], "the drive": rows, "the friction": self._now[sim, c.RESISTANCE]}
         return next((part for part, torque in torques.items() if not np.isfinite(torque).all()), "the friction")
 
     def next_stop(self, step: int) -> int:
@@ -253,7 +221,7 @@ class Bench:
 
     def tell(self, *, ended: bool = False) -> None:
         """Hand on to the watcher a stretch of the first simulation, if it is complete, or will not be."""
-        final = min(self._records.shape[2], self.clock.final(int(self.numbers[0, STEP])))
+        final = min(self._records.shape[2], self.clock.final(int(self.numbers[0, c.STEP])))
         if self._watcher and (ended or final >= self._watcher.awaited):
             channels = {name: self._records[0, CHANNELS.index(name)] for name in ("measured", "q", "qd", "tau", "command")}
             channels["logged"] = self._records[0, CHANNELS.index(self._scenario.torque.recorded)]
@@ -290,13 +258,6 @@ def _plant(
     edits = scenario.payload.edit, scenario.friction.edit, scenario.drive.edit, partial(with_play, play=play, h=h)
     model = Robot.load(scenario.robot, *edits).model
     return robots, Plant([model] * nsim, scenario.physics, h, bounds, 2)
-
-
-def _series(ripple: RippleSeries) -> tuple[Series, list[Array]]:
-    """Return a ripple as C takes it, and the arrays that it points to."""
-    arrays = [np.ascontiguousarray(x, dtype=np.float64) for x in (ripple.amplitude, ripple.order, ripple.phase)]
-    arrays.append(np.array(ripple.harmonics))
-    return Series(*map(pointer, arrays), len(ripple.harmonics)), arrays
 
 
 def _holding(scenario: Scenario, robot: Robot, planned: Reference, nsim: int, vary: Mapping[str, npt.ArrayLike]) -> Array:

@@ -43,7 +43,7 @@ class Bounds:
         return ""
 
     def all_broken(self, q: Array, qd: Array) -> dict[int, str]:
-        """Return what is broken in simulations, by their number; states of all, shape (nsim, joint)."""
+        """Broken simulations by their number, and what their joint does; states of all, shape (nsim, joint)."""
         middle, half, fastest = self.box
         good = (np.abs(q - middle) <= half) & (np.abs(qd) <= fastest)  # False for NaN
         return {sim: self.broken(sim, q[sim], qd[sim]) for sim in np.flatnonzero(~good.all(axis=1)).tolist()}

@@ -6,13 +6,13 @@
 
 #include "../part.h"
 
-enum { DONE, READ, COMMAND, DRIVE, RESIST };  /* why it returns: done, or a part is Python's */
+enum { DONE, READ, COMMAND, DRIVE, RESIST };          /* why it returns: done, or a part is Python's */
 enum { RUNNING, OUT_OF_BOUNDS, NOT_FINITE, STOPPED }; /* how a simulation is; what cannot go on is told in Python */
 enum { STEP, PLACE, SAMPLE, STEPS, ROWS, TORQUES, STATE, TRACED, BEFORE_STEPS }; /* whole numbers that it remembers */
 enum { BEFORE, COMMANDED, DEMAND, SPEED, SENSED, THEN, MEASURED, RESISTANCE }; /* remembered of each joint */
 enum { MIDDLE_Q, MIDDLE_QD, SEEN, CONSTANT, TURNING, ELECTRIC, TAU, TOTAL };   /* of each joint in each step to come */
 enum { OUT_MEASURED, OUT_COMMAND, OUT_CURRENT, OUT_Q, OUT_QD, OUT_TAU, OUT_GAP };
-enum { WARNINGS = 7 };
+enum { WARNINGS = 7 }; /* kinds of MuJoCo 4 */
 
 typedef struct { /* sum over k of amplitude * harmonics[k] * sin((k + 1) (order q + phase)) */
   double *amplitude, *order, *phase, *harmonics;
@@ -32,17 +32,16 @@ typedef struct { /* the robot of a simulation in MuJoCo, and where a loop at wor
 
 typedef struct {
   Body body;
-  int64_t n, samples, per_sample, late, most, steady, smooth, sees_rotor, signals, ring;
+  int64_t samples, per_sample, late, most, steady, smooth, sees_rotor, signals, ring;
   double old, h, filter;
   Part *encoder, *law, *drive, *friction;
   Series cogging, commutation;
   double *offsets, *q_ring, *qd_ring, *now, *rows, *records, *drawn, *trace;
-  int64_t *N;
 } Loop;
 
-#define NOW(l, row) ((l)->now + (row) * (l)->n)
-#define ROWS_OF(l, row) ((l)->rows + (row) * (l)->most * (l)->n)
-#define RECORD(l, channel, k) ((l)->records + ((channel) * (l)->samples + (k)) * (l)->n)
+#define NOW(l, row) ((l)->now + (row) * (l)->body.n)
+#define ROWS_OF(l, row) ((l)->rows + (row) * (l)->most * (l)->body.n)
+#define RECORD(l, channel, k) ((l)->records + ((channel) * (l)->samples + (k)) * (l)->body.n)
 
 static double ripple(const Series *s, double q, int64_t j) {
   double angle = s->order[j] * q + s->phase[j], total = s->harmonics[0] * sin(angle);
@@ -64,7 +63,7 @@ static int in_bounds(const Body *b) {
 /* Position at an instant, in steps, by the cubic that has the positions and velocities of the steps about it. */
 static double between(const Loop *l, double x, int64_t last, int64_t j) {
   x = fmax(x, 0);
-  int64_t n = l->n, before = (int64_t)floor(x), after;
+  int64_t n = l->body.n, before = (int64_t)floor(x), after;
   before = before < last ? before : last;
   after = before < last ? before + 1 : last;
   double s = x - before, *q = l->q_ring, *qd = l->qd_ring;
@@ -76,10 +75,10 @@ static double between(const Loop *l, double x, int64_t last, int64_t j) {
 /* Record a sample; see whether a command begins to act, and what the encoder then reads. */
 static void begin(Loop *l) {
   const Body *b = &l->body;
-  int64_t n = l->n, step = l->N[STEP], k = step / l->per_sample, since = step - l->late, at = step % l->ring * n;
+  int64_t n = l->body.n, step = l->body.N[STEP], k = step / l->per_sample, since = step - l->late, at = step % l->ring * n;
   if (step % l->per_sample == 0) {
     if (!in_bounds(b)) {
-      l->N[STATE] = OUT_OF_BOUNDS;
+      l->body.N[STATE] = OUT_OF_BOUNDS;
       return;
     }
     for (int64_t j = 0; k < l->samples && j < n; j++) {
@@ -93,18 +92,18 @@ static void begin(Loop *l) {
     l->q_ring[at + j] = l->sees_rotor ? of_rotor(b, b->qpos, j) : of_link(b, b->qpos, j);
     l->qd_ring[at + j] = l->sees_rotor ? of_rotor(b, b->qvel, j) : of_link(b, b->qvel, j);
   }
-  l->N[SAMPLE] = since >= 0 && since % l->per_sample == 0 ? since / l->per_sample : -1;
-  if (l->N[SAMPLE] >= 0)
+  l->body.N[SAMPLE] = since >= 0 && since % l->per_sample == 0 ? since / l->per_sample : -1;
+  if (l->body.N[SAMPLE] >= 0)
     for (int64_t j = 0; j < n; j++)
-      NOW(l, THEN)[j] = l->offsets ? between(l, since + l->offsets[l->N[SAMPLE]], step, j) : l->q_ring[since % l->ring * n + j];
+      NOW(l, THEN)[j] = l->offsets ? between(l, since + l->offsets[l->body.N[SAMPLE]], step, j) : l->q_ring[since % l->ring * n + j];
 }
 
 /* Let a new command act: together with the one before where it begins within a step. */
 static void obey(Loop *l) {
-  for (int64_t j = 0; j < l->n; j++) {
+  for (int64_t j = 0; j < l->body.n; j++) {
     double command = NOW(l, COMMANDED)[j];
-    RECORD(l, OUT_MEASURED, l->N[SAMPLE])[j] = NOW(l, MEASURED)[j];
-    RECORD(l, OUT_COMMAND, l->N[SAMPLE])[j] = command;
+    RECORD(l, OUT_MEASURED, l->body.N[SAMPLE])[j] = NOW(l, MEASURED)[j];
+    RECORD(l, OUT_COMMAND, l->body.N[SAMPLE])[j] = command;
     NOW(l, DEMAND)[j] = l->old == 0 ? command : l->old * NOW(l, BEFORE)[j] + (1 - l->old) * command;
   }
 }
@@ -112,7 +111,7 @@ static void obey(Loop *l) {
 /* For how many steps nothing changes, and where the joints will be in the middle of each, accelerating as before. */
 static void look_ahead(Loop *l) {
   const Body *b = &l->body;
-  int64_t n = l->n, step = l->N[STEP], per = l->per_sample, after = ((step - l->late) % per + per) % per, steps = per - after;
+  int64_t n = l->body.n, step = l->body.N[STEP], per = l->per_sample, after = ((step - l->late) % per + per) % per, steps = per - after;
   if (after == 1) memcpy(NOW(l, DEMAND), NOW(l, COMMANDED), n * sizeof(double));
   if (per - step % per < steps) steps = per - step % per;
   if (l->most < steps) steps = l->most;
@@ -120,7 +119,7 @@ static void look_ahead(Loop *l) {
   int64_t rows = l->steady ? 1 : steps;
   double length = (double)(steps / rows) * l->h;
   for (int64_t j = 0; j < n; j++) {
-    double q = of_rotor(b, b->qpos, j), qd = of_rotor(b, b->qvel, j), rate = (qd - NOW(l, SPEED)[j]) / (l->N[BEFORE_STEPS] * l->h);
+    double q = of_rotor(b, b->qpos, j), qd = of_rotor(b, b->qvel, j), rate = (qd - NOW(l, SPEED)[j]) / (l->body.N[BEFORE_STEPS] * l->h);
     double q_apart = of_link(b, b->qpos, j) - q, qd_apart = of_link(b, b->qvel, j) - qd;
     NOW(l, SPEED)[j] = qd;
     for (int64_t r = 0; r < rows; r++) {
@@ -133,14 +132,14 @@ static void look_ahead(Loop *l) {
       ROWS_OF(l, TURNING)[r * n + j] = mid_qd * constant;
     }
   }
-  l->N[STEPS] = l->N[BEFORE_STEPS] = steps;
-  l->N[ROWS] = rows;
+  l->body.N[STEPS] = l->body.N[BEFORE_STEPS] = steps;
+  l->body.N[ROWS] = rows;
 }
 
 /* Torques of the motors, ripple included, and the current that a sensor sees behind its filter. */
 static void ripple_torques(Loop *l) {
-  int64_t n = l->n, given = l->N[TORQUES], rows = l->smooth || given > l->N[ROWS] ? given : l->N[ROWS];
-  double part = l->N[STEPS] * l->h / given;
+  int64_t n = l->body.n, given = l->body.N[TORQUES], rows = l->smooth || given > l->body.N[ROWS] ? given : l->body.N[ROWS];
+  double part = l->body.N[STEPS] * l->h / given;
   for (int64_t r = 0; r < given; r++)
     for (int64_t j = 0; j < n; j++) {
       double electric = ROWS_OF(l, ELECTRIC)[r * n + j], *sensed = NOW(l, SENSED) + j;
@@ -149,80 +148,80 @@ static void ripple_torques(Loop *l) {
   for (int64_t r = 0; r < rows; r++)
     for (int64_t j = 0; j < n; j++) {
       double electric = ROWS_OF(l, ELECTRIC)[(given == 1 ? 0 : r) * n + j];
-      int64_t at = (l->N[ROWS] == 1 ? 0 : r) * n + j;
+      int64_t at = (l->body.N[ROWS] == 1 ? 0 : r) * n + j;
       ROWS_OF(l, TAU)[r * n + j] =
           l->smooth ? electric : electric * ROWS_OF(l, CONSTANT)[at] + ripple(&l->cogging, ROWS_OF(l, MIDDLE_Q)[at], j);
     }
-  l->N[ROWS] = rows;
+  l->body.N[ROWS] = rows;
 }
 
 /* Rows of start and length [steps], length of the rows of the drive's own signals, torques, signals: of the watched alone. */
 static void trace(Loop *l) {
-  int64_t n = l->n, rows = l->N[ROWS], size = 3 + (1 + l->signals) * n;
+  int64_t n = l->body.n, rows = l->body.N[ROWS], size = 3 + (1 + l->signals) * n;
   for (int64_t r = 0; r < rows; r++) {
-    double *row = l->trace + l->N[TRACED]++ * size;
-    row[0] = l->N[STEP] + r * (l->N[STEPS] / rows);
-    row[1] = l->N[STEPS] / rows;
-    row[2] = (double)l->N[STEPS] / l->N[TORQUES];
+    double *row = l->trace + l->body.N[TRACED]++ * size;
+    row[0] = l->body.N[STEP] + r * (l->body.N[STEPS] / rows);
+    row[1] = l->body.N[STEPS] / rows;
+    row[2] = (double)l->body.N[STEPS] / l->body.N[TORQUES];
     memcpy(row + 3, ROWS_OF(l, TAU) + r * n, n * sizeof *row);
-    memcpy(row + 3 + n, l->drawn + (l->N[TORQUES] == 1 ? 0 : r) * l->signals * n, l->signals * n * sizeof *row);
+    memcpy(row + 3 + n, l->drawn + (l->body.N[TORQUES] == 1 ? 0 : r) * l->signals * n, l->signals * n * sizeof *row);
   }
 }
 
 /* Take the steps. */
 static void go(Loop *l) {
-  int64_t n = l->n, rows = l->N[ROWS], k = l->N[STEP] / l->per_sample;
+  int64_t n = l->body.n, rows = l->body.N[ROWS], k = l->body.N[STEP] / l->per_sample;
   double *total = ROWS_OF(l, TOTAL), *tau = ROWS_OF(l, TAU);
   for (int64_t x = 0; x < rows * n; x++)
-    if (!isfinite(total[x] = tau[x] + NOW(l, RESISTANCE)[x % n])) l->N[STATE] = NOT_FINITE;
-  if (l->N[STATE]) return;
+    if (!isfinite(total[x] = tau[x] + NOW(l, RESISTANCE)[x % n])) l->body.N[STATE] = NOT_FINITE;
+  if (l->body.N[STATE]) return;
   if (l->trace) trace(l);
-  for (int64_t s = 0; s < l->N[STEPS]; s++) {
+  for (int64_t s = 0; s < l->body.N[STEPS]; s++) {
     for (int64_t j = 0; j < n && s < rows; j++) l->body.applied[j * l->body.stride] = total[s * n + j];
     l->body.step(l->body.model, l->body.data);
   }
   for (int64_t j = 0; j < n && k < l->samples; j++) {
     double sum = 0;
     for (int64_t r = 0; r < rows; r++) sum += tau[r * n + j];
-    RECORD(l, OUT_TAU, k)[j] += sum / rows * l->N[STEPS];
+    RECORD(l, OUT_TAU, k)[j] += sum / rows * l->body.N[STEPS];
   }
-  l->N[STEP] += l->N[STEPS];
+  l->body.N[STEP] += l->body.N[STEPS];
 }
 
 static int64_t advance(Body *b, int64_t until) {
   Loop *l = (Loop *)b;
-  switch (l->N[PLACE]) {
+  switch (l->body.N[PLACE]) {
     case READ: goto was_read;
     case COMMAND: goto was_commanded;
     case DRIVE: goto was_driven;
     case RESIST: goto was_resisted;
   }
-  while (l->N[STEP] < until) {
+  while (l->body.N[STEP] < until) {
     begin(l);
-    if (l->N[STATE]) break;
-    if (l->N[SAMPLE] >= 0) {
-      if (!l->encoder->run) return l->N[PLACE] = READ;
-      ((Sampled *)l->encoder->run)(l->encoder, l->N[SAMPLE], NOW(l, THEN), NOW(l, MEASURED));
+    if (l->body.N[STATE]) break;
+    if (l->body.N[SAMPLE] >= 0) {
+      if (!l->encoder->run) return l->body.N[PLACE] = READ;
+      ((Sampled *)l->encoder->run)(l->encoder, l->body.N[SAMPLE], NOW(l, THEN), NOW(l, MEASURED));
     was_read:
-      memcpy(NOW(l, BEFORE), NOW(l, COMMANDED), l->n * sizeof(double));
-      if (!l->law->run) return l->N[PLACE] = COMMAND;
-      ((Sampled *)l->law->run)(l->law, l->N[SAMPLE], NOW(l, MEASURED), NOW(l, COMMANDED));
+      memcpy(NOW(l, BEFORE), NOW(l, COMMANDED), l->body.n * sizeof(double));
+      if (!l->law->run) return l->body.N[PLACE] = COMMAND;
+      ((Sampled *)l->law->run)(l->law, l->body.N[SAMPLE], NOW(l, MEASURED), NOW(l, COMMANDED));
     was_commanded:
       obey(l);
     }
     look_ahead(l);
-    if (!l->drive->run) return l->N[PLACE] = DRIVE;
-    l->N[TORQUES] = ((Driving *)l->drive->run)(l->drive, l->N[ROWS], l->N[STEPS], NOW(l, DEMAND), ROWS_OF(l, SEEN),
+    if (!l->drive->run) return l->body.N[PLACE] = DRIVE;
+    l->body.N[TORQUES] = ((Driving *)l->drive->run)(l->drive, l->body.N[ROWS], l->body.N[STEPS], NOW(l, DEMAND), ROWS_OF(l, SEEN),
                                                ROWS_OF(l, TURNING), ROWS_OF(l, ELECTRIC), l->trace ? l->drawn : 0);
   was_driven:
     ripple_torques(l);
-    if (!l->friction->run) return l->N[PLACE] = RESIST;
+    if (!l->friction->run) return l->body.N[PLACE] = RESIST;
     ((Resisting *)l->friction->run)(l->friction, ROWS_OF(l, TAU), ROWS_OF(l, MIDDLE_QD), NOW(l, RESISTANCE));
   was_resisted:
     go(l);
-    if (l->N[STATE]) break;
+    if (l->body.N[STATE]) break;
   }
-  return l->N[PLACE] = DONE;
+  return l->body.N[PLACE] = DONE;
 }
 
 /* MuJoCo would end the process: an error ends its simulation alone. What it warns of is counted, and is no reason to print. */
@@ -265,9 +264,9 @@ static int64_t guarded(int64_t (*run)(Body *, int64_t), Body *b, int64_t until) 
 int64_t run_loops(Loop *loops, int64_t count, int64_t until) {
   int64_t place = DONE;
   for (Loop *l = loops; l < loops + count; l++)
-    if (!l->N[STATE]) {
+    if (!l->body.N[STATE]) {
       int64_t stop = guarded(advance, &l->body, until);
-      if (!l->N[STATE]) place = stop;
+      if (!l->body.N[STATE]) place = stop;
     }
   return place;
 }

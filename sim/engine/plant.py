@@ -5,7 +5,6 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from copy import copy
-from functools import cache
 from itertools import pairwise
 from os import cpu_count
 from typing import Any
@@ -14,6 +13,7 @@ import mujoco
 import numpy as np
 
 from idbench.identify.compiled import function, pointer
+from idbench.sim.engine import loop as c
 from idbench.sim.engine.failures import Bounds
 from idbench.sim.part import mujoco_function
 from idbench.sim.robot.motors import Array
@@ -27,22 +27,6 @@ SWITCHED_OFF = (
     mujoco.mjtDisableBit.mjDSBL_AUTORESET,
 )
 """Of MuJoCo."""
-
-SAMPLE, STATE, COUNT = 2, 6, 9
-"""Places of whole numbers that C remembers of a simulation (loop.c): its sample, how it is; and how many there are."""
-
-RUNNING, OUT_OF_BOUNDS, NOT_FINITE, STOPPED = range(4)
-"""How a simulation is."""
-
-
-class SteppedBody(ctypes.Structure):
-    """The robot of one simulation in MuJoCo, and where a loop at work keeps it."""
-
-    _fields_ = (
-        *((name, ctypes.c_void_p) for name in ("step", "model", "data", "qpos", "qvel", "applied", "warned")),
-        *((name, ctypes.c_int64) for name in ("n", "stride")),
-        *((name, ctypes.c_void_p) for name in ("middle", "half", "fastest", "numbers", "complaint")),
-    )
 
 
 class Plant:
@@ -64,12 +48,13 @@ class Plant:
 
     def __init__(self, models: Sequence[mujoco.MjModel], physics: Physics, h: float, bounds: Bounds, stride: int = 1) -> None:
         nsim, n = len(models), models[0].nv // stride
-        self.stride, self.n, self.h = stride, n, h
+        self.stride, self.n = stride, n
         self.models = [stepping(model, h, physics.integrator) for model in models]
         self.datas = [mujoco.MjData(model) for model in self.models]
-        self.numbers, self._complaints = np.zeros((nsim, COUNT), dtype=np.int64), np.zeros((nsim, 1024), dtype=np.uint8)
+        self.numbers = np.zeros((nsim, c.BEFORE_STEPS + 1), dtype=np.int64)
+        self._complaints = np.zeros((nsim, 1024), dtype=np.uint8)
         middle, half, fastest = self._box = [np.ascontiguousarray(x) for x in bounds.box]
-        self.bodies = (SteppedBody * nsim)()
+        self.bodies = (c.LoopBody * nsim)()
         for i, (body, m, d) in enumerate(zip(self.bodies, self.models, self.datas, strict=True)):
             arrays = d.qpos, d.qvel, d.qfrc_applied
             warned = d.warning.number.ctypes.data  # a column of pairs
@@ -125,22 +110,17 @@ class Plant:
 
     def trouble(self, sim: int) -> str:
         """What MuJoCo complains of in a simulation; empty if of nothing."""
-        if self.numbers[sim, STATE] == STOPPED:
+        if self.numbers[sim, c.STATE] == c.STOPPED:
             return " ".join(self._complaints[sim].tobytes().split(b"\0")[0].decode(errors="replace").split())
         warnings = self.datas[sim].warning
         return next((mujoco.mju_warningText(k, int(w.lastinfo)) for k, w in enumerate(warnings) if w.number), "")
 
 
-@cache
-def _guard() -> None:
-    """Let an error of MuJoCo end its simulation, instead of the process."""
-    function("catch_errors", ctypes.c_void_p)(mujoco_function("mju_setLogHandler"))
-
-
 @contextmanager
 def side_by_side(count: int, threads: int) -> Iterator[Callable[[Callable[[int, int], Any]], list[Any]]]:
     """Yield what calls a function with (first, number) of shares of simulations, on native threads: 0 are all processors."""
-    _guard()
+    # An error of MuJoCo ends its simulation, not the process. Each time: others may have set a handler of their own.
+    function("catch_errors", ctypes.c_void_p)(mujoco_function("mju_setLogHandler"))
     edges = np.linspace(0, count, min(threads or cpu_count() or 1, count) + 1).astype(int).tolist()
     shares = [(a, b - a) for a, b in pairwise(edges)]
     if len(shares) == 1:

@@ -11,6 +11,7 @@ from idbench.identify.basis import BLOCKS, AbstractFriction, Shape, ShapedFricti
 from idbench.identify.basis.block import named
 from idbench.identify.basis.friction.shape import with_settings
 from idbench.sim.frictions.friction_law import AbstractContact, AbstractFrictionLaw, CompiledContact, PlantJoints
+from idbench.sim.part import Addresses
 from idbench.sim.robot.motors import Array
 from idbench.sim.robot.robot import Robot
 from idbench.sim.settings import EachNotNegative, EachNumber, Number, Positive, per_joint, settings
@@ -163,7 +164,7 @@ def _lossy(name: str, plant: PlantJoints, rows: tuple[npt.ArrayLike, ...]) -> Co
     """Return a friction in C that writes MuJoCo's Coulomb friction."""
     shape, names = np.shape(rows[0]), ("dof_frictionloss", "qfrc_passive", "qfrc_constraint")
     addresses = list(zip(*map(plant.addresses, names), strict=True))
-    return CompiledContact(name, (shape[0], shape[1]), rows, objects=addresses, stride=plant.stride)
+    return CompiledContact(name, (shape[0], shape[1]), rows, objects=Addresses(addresses, plant), stride=plant.stride)
 
 
 @settings

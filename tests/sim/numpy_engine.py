@@ -1,6 +1,7 @@
 """The closed loop in NumPy, one simulation: an independent route to what the compiled loop does."""
 
 from functools import partial
+from types import SimpleNamespace
 
 import mujoco
 import numpy as np
@@ -217,68 +218,87 @@ def offsets(scenario, seed, samples, clock):
     return off - (np.arange(samples) * clock.per_sample + off - period * rng.random()) % period if period else off
 
 
-def simulated(scenario, seed=0, length=np.inf):  # noqa: PLR0915  # a loop from top to bottom
-    """Measured and commanded, true positions, velocities and torques, shape (sample, joint) each, of the first seconds."""
+def begun(scenario, seed):
+    """All that a simulation needs, by name."""
     robot, fs = scenario.real_robot, scenario.fs
     planned, n = scenario.trajectory.sample(robot, fs), robot.n
-    h = scenario.drive.step_length(fs, scenario.physics.step)
-    clock, play = Clock(round(1 / fs / h), h, scenario.timing.delay), scenario.drive.play(robot)
+    h, play = scenario.drive.step_length(fs, scenario.physics.step), scenario.drive.play(robot)
     edits = scenario.payload.edit, scenario.friction.edit, scenario.drive.edit, partial(with_play, play=play, h=h)
     stride = 2 if play.any() else 1
-    described = Robot.load(scenario.robot, *edits).model if play.any() else robot.model
-    model = stepping(described, h, scenario.physics.integrator)
-    data, samples = mujoco.MjData(model), len(planned.q)
+    model = stepping(Robot.load(scenario.robot, *edits).model if play.any() else robot.model, h, scenario.physics.integrator)
+    data, samples, clock = mujoco.MjData(model), len(planned.q), Clock(round(1 / fs / h), h, scenario.timing.delay)
     data.qpos[::stride] = planned.q[0]
-    commanding = law(scenario.controller, Task(scenario.nominal_robot, planned, 1))
-    reading = reader(scenario.encoder, n, samples, fs, generators((seed,), 0)[0])
-    driving, resisting = drive(scenario.drive, robot, h), friction(scenario.friction, model, data, stride, h)
-    cogging, commutation = scenario.ripple.start(robot)
-    smooth, before_gear = scenario.ripple.steady, scenario.drive.before_gear
-    steady, history = scenario.drive.steady and smooth, History(h)
-    timing = scenario.timing
-    off = offsets(scenario, seed, samples, clock) if timing.jitter or timing.refresh else np.zeros(samples)
+    timing, steady = scenario.timing, scenario.drive.steady and scenario.ripple.steady
     stepwise = timing.jitter or timing.refresh or scenario.torque.source == "current" or not scenario.friction.steady
-    most = 1 if stepwise else clock.per_sample if steady else max(1, round(BLOCK / h))
     still = planned.q[:1] * 0
-    holds = planned.q[0] if scenario.drive.commands == "position" else InverseDynamics(robot, 1)(planned.q[:1], still, still)[0]
-    command = demand = holds
-    out = {name: np.zeros((samples, n)) for name in ("measured", "command", "current", "q", "qd", "tau")}
-    sensed, before_qd, before_steps, step = np.zeros(n), np.zeros(n), 1, 0
-    while step < min(samples, length * fs) * clock.per_sample + clock.late:
+    return SimpleNamespace(
+        model=model,
+        data=data,
+        stride=stride,
+        samples=samples,
+        clock=clock,
+        law=law(scenario.controller, Task(scenario.nominal_robot, planned, 1)),
+        reader=reader(scenario.encoder, n, samples, fs, generators((seed,), 0)[0]),
+        drive=drive(scenario.drive, robot, h),
+        friction=friction(scenario.friction, model, data, stride, h),
+        ripples=scenario.ripple.start(robot),
+        steady=steady,
+        off=offsets(scenario, seed, samples, clock) if timing.jitter or timing.refresh else np.zeros(samples),
+        most=1 if stepwise else clock.per_sample if steady else max(1, round(BLOCK / h)),
+        holds=planned.q[0]
+        if scenario.drive.commands == "position"
+        else InverseDynamics(robot, 1)(planned.q[:1], still, still)[0],
+    )
+
+
+def torques(scenario, s, demand, state, before, steps):
+    """Velocities in the middle of steps, and torques of the motors in them without and with ripple."""
+    (rotor, rotor_qd, q, qd), (before_qd, before_steps), rows = state, before, 1 if s.steady else steps
+    t = (np.arange(rows)[:, None] + 0.5) * (steps / rows * s.clock.h)
+    rate = (rotor_qd - before_qd) / (before_steps * s.clock.h)
+    mid_qd, mid_q = rotor_qd + rate * t, rotor + rotor_qd * t + rate * (t**2 / 2)
+    smooth, (cogging, commutation) = scenario.ripple.steady, s.ripples
+    constant = 1.0 if smooth else 1 + ripple(commutation, mid_q)
+    apart = s.stride == 2 and not scenario.drive.before_gear
+    seen = mid_q + (q - rotor) + (qd - rotor_qd) * t if apart else mid_q
+    electric = s.drive(demand, mid_qd * constant, seen, steps)
+    return mid_qd, electric, electric if smooth else electric * constant + ripple(cogging, mid_q)
+
+
+def simulated(scenario, seed=0, length=np.inf):
+    """Measured and commanded, true positions, velocities and torques, shape (sample, joint) each, of the first seconds."""
+    s = begun(scenario, seed)
+    clock, data, stride, history = s.clock, s.data, s.stride, History(s.clock.h)
+    out = {name: np.zeros((s.samples, len(s.holds))) for name in ("measured", "command", "current", "q", "qd", "tau")}
+    command = demand = s.holds
+    sensed, before, step, last = 0 * s.holds, (0 * s.holds, 1), 0, int(min(s.samples, length * scenario.fs))
+    cut = 2 * np.pi * (scenario.torque.cutoff or np.inf)
+    while step < last * clock.per_sample + clock.late:
         rotor, rotor_qd = data.qpos[::stride].copy(), data.qvel[::stride].copy()
         q = rotor if stride == 1 else rotor + data.qpos[1::2]
         qd = rotor_qd if stride == 1 else rotor_qd + data.qvel[1::2]
         k, late = divmod(step, clock.per_sample)
-        if late == 0 and k < samples:
+        if late == 0 and k < s.samples:
             out["q"][k], out["qd"][k], out["current"][k] = q, qd, sensed
-        history.put(step, *((rotor, rotor_qd) if before_gear else (q, qd)))
+        history.put(step, *((rotor, rotor_qd) if scenario.drive.before_gear else (q, qd)))
         c, after = divmod(step - clock.late, clock.per_sample)
         if after == 0 and c >= 0:
-            before, out["measured"][c] = command, reading(c, history.at(step - clock.late + off[c]))
-            out["command"][c] = command = np.ravel(commanding(c, out["measured"][c]))
-            demand = command if clock.old == 0 else clock.old * before + (1 - clock.old) * command
+            earlier, out["measured"][c] = command, s.reader(c, history.at(step - clock.late + s.off[c]))
+            out["command"][c] = command = np.ravel(s.law(c, out["measured"][c]))
+            demand = command if clock.old == 0 else clock.old * earlier + (1 - clock.old) * command
         elif after == 1:
             demand = command
-        steps = min(clock.per_sample - after, clock.per_sample - late, most)
-        steps = 1 if after == 0 and (steady or clock.old > 0) else steps
-        rows = 1 if steady else steps
-        t = (np.arange(rows)[:, None] + 0.5) * (steps / rows * h)
-        rate = (rotor_qd - before_qd) / (before_steps * h)
-        before_qd, before_steps = rotor_qd, steps
-        mid_qd, mid_q = rotor_qd + rate * t, rotor + rotor_qd * t + rate * (t**2 / 2)
-        constant = 1.0 if smooth else 1 + ripple(commutation, mid_q)
-        seen = mid_q + (q - rotor) + (qd - rotor_qd) * t if stride == 2 and not before_gear else mid_q
-        electric = driving(demand, mid_qd * constant, seen, steps)
+        steps = min(clock.per_sample - after, clock.per_sample - late, s.most)
+        steps = 1 if after == 0 and (s.steady or clock.old > 0) else steps
+        mid_qd, electric, tau = torques(scenario, s, demand, (rotor, rotor_qd, q, qd), before, steps)
+        before = rotor_qd, steps
         for part in electric:
-            cut = 2 * np.pi * (scenario.torque.cutoff or np.inf)
-            sensed = part - (part - sensed) * np.exp(-cut * (steps * h) / len(electric))
-        tau = electric if smooth else electric * constant + ripple(cogging, mid_q)
-        total = tau + resisting(tau[0], mid_qd[0])
-        for s in range(steps):
-            data.qfrc_applied[::stride] = total[min(s, len(total) - 1)]
-            mujoco.mj_step(model, data)
-        if k < samples:
+            sensed = part - (part - sensed) * np.exp(-cut * (steps * clock.h) / len(electric))
+        total = tau + s.friction(tau[0], mid_qd[0])
+        for i in range(steps):
+            data.qfrc_applied[::stride] = total[min(i, len(total) - 1)]
+            mujoco.mj_step(s.model, data)
+        if k < s.samples:
             out["tau"][k] += np.add.reduce(tau) / len(tau) * steps / clock.per_sample
         step += steps
-    last = int(min(samples, length * fs))
     return {name: values[:last] for name, values in out.items()}

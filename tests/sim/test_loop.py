@@ -1,6 +1,8 @@
 """The compiled loop against the same loop in NumPy, where it stops for Python, and how errors of MuJoCo end in it."""
 
+import re
 from dataclasses import replace
+from importlib.resources import files
 
 import mujoco
 import numpy as np
@@ -16,15 +18,19 @@ from idbench.sim.controllers import PID, AbstractController, AbstractLaw, Comput
 from idbench.sim.drives import AveragedDrive, SwitchedDrive
 from idbench.sim.drives.drive import AbstractAmplifier, AbstractDrive
 from idbench.sim.encoders import AbstractEncoder, AbstractReader, IncrementalEncoder
+from idbench.sim.engine import loop
 from idbench.sim.engine.simulation import simulate
 from idbench.sim.engine.watch import Watch
 from idbench.sim.frictions import Asymmetric, Dahl, Law, LoadDependent, LuGre, Stribeck, Warming
 from idbench.sim.frictions.friction_law import AbstractContact, AbstractFrictionLaw
+from idbench.sim.part import Part
 from idbench.sim.scenario.measurement import Ripple, TorqueMeasurement
 from idbench.sim.scenario.scenario import Physics, Timing
 from idbench.sim.scenario.scenario_file import load, names
 from idbench.sim.settings import settings
 from idbench.sim.trajectories import Quintic
+
+STRUCTURES = {"Series": loop.LoopRipple, "Body": loop.LoopBody, "Loop": loop.Loop}
 
 BUSY = IncrementalEncoder(lines=2000, noise=1e-4, missed_counts=1.0, interpolation_error=0.01)
 MOVE = Quintic(((0.0, 0.0), (0.6, -0.5), (0.0, 0.2)), (0.4, 0.4), 0.1)
@@ -233,18 +239,45 @@ def test_without_compiled_code_the_way_out_is_told(monkeypatch, tmp_path):
         library.cache_clear()
 
 
-def test_servo_parameters_are_in_the_order_of_c(root):
-    """Fields of the structure in C, and of the tuple that is written over it."""
-    text = (root / "identify/servo/servo.c").read_text()
-    fields = text.split("typedef struct { /* ServoLaw */")[1].split("} Law;")[0].replace("double", "").replace(";", "")
-    assert [x.strip() for x in fields.split(",")] == list(ServoLaw._fields)
+def fields(text, name):
+    """Names in a structure of C, in their order."""
+    body = re.search(r"typedef struct \{([^{}]*)\} " + name + ";", re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL))[1]
+    body = re.sub(r"void \(\*(\w+)\)\([^)]*\)", r"void \1", body)
+    each = (re.sub(r"^\s*(const )?\w+ ", "", line) for line in body.split(";"))
+    return [name.strip(" *\n") for line in each for name in line.split(",") if name.strip()]
 
 
-def test_the_friction_of_a_servo_is_its_formula(rng):
-    """Every term, by hand."""
+@pytest.mark.parametrize(
+    ("path", "name", "expected"),
+    [
+        ("identify/servo/servo.c", "Law", ServoLaw._fields),
+        ("sim/part.h", "Part", [name for name, _ in Part._fields_]),
+        *[("sim/engine/loop.c", name, [x for x, _ in kind._fields_]) for name, kind in STRUCTURES.items()],
+    ],
+    ids=["Law", "Part", *STRUCTURES],
+)
+def test_structures_are_in_the_order_of_c(root, path, name, expected):
+    assert [x.partition("[")[0] for x in fields((root / path).read_text(), name)] == list(expected)
+
+
+def test_places_are_in_the_order_of_c(root):
+    """Of every list of names in loop.c of which Python has one."""
+    text = re.sub(r"/\*.*?\*/", "", (root / "sim/engine/loop.c").read_text(), flags=re.DOTALL)
+    lists = [[x.strip() for x in names.split(",")] for names in re.findall(r"enum \{([^}=]*)\}", text)]
+    assert [f"OUT_{x.upper()}" for x in loop.CHANNELS] in lists
+    places = {name: k for names in lists for k, name in enumerate(names) if hasattr(loop, name)}
+    assert len(places) == 34
+    assert {name: getattr(loop, name) for name in places} == places
+
+
+def test_the_written_friction_of_a_servo_is_that_of_c(rng):
+    """Python that goes to users, every term."""
     p = ServoLaw(*rng.uniform(0.1, 1.0, len(ServoLaw._fields)))
-    for speed, motor, external, sent in rng.uniform(-2, 2, (20, 4)):
-        load, least = abs(external - motor), min(external**2, motor**2) * (external * motor < 0)
-        expected = p.Fs + (p.Fst + p.Fls * load) * np.exp(-abs(speed) / p.vs) + p.Fl * load
-        expected += abs(p.Fle * external - p.Flm * motor) + p.Flq * least + p.Fgd * max(sent, 0) + p.Fgb * max(-sent, 0)
-        assert friction(p, speed, motor, external, sent) == pytest.approx(expected, rel=1e-12)
+    text = files("idbench.experiments.exports").joinpath("servo.py.txt").read_text(encoding="utf-8")
+    written = {}
+    exec(text.replace("{servos}", repr({"hip": {k: float(x) for k, x in p._asdict().items()}})), written)
+    servo = written["Servo"]("hip", 1e-3)
+    for speed, motor, external, sent in rng.uniform(-2, 2, (20, 4)).tolist():
+        assert servo.friction(speed, motor, external, sent) == pytest.approx(
+            friction(p, speed, motor, external, sent), rel=1e-12
+        )
