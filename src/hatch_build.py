@@ -40,7 +40,7 @@ class CustomBuildHook(BuildHookInterface):  # type: ignore[type-arg]  # its name
     def _platform(self) -> str | None:
         platform = os.environ.get("IDBENCH_PLATFORM") or None
         if platform and platform not in PLATFORMS:
-            raise SystemExit(f"IDBENCH_PLATFORM = {platform!r} must be one of {', '.join(PLATFORMS)}")
+            raise ValueError(f"IDBENCH_PLATFORM = {platform!r} must be one of {', '.join(PLATFORMS)}")
         return platform
 
     def dependencies(self) -> list[str]:
