@@ -16,7 +16,7 @@ from idbench.identify.estimators.log_rows import LogRows, Piece, bias_counts, pi
 from idbench.identify.estimators.simulator import Simulation
 from idbench.identify.models import AbstractModel, ExplicitModel
 from idbench.identify.noise.propagation import NoiseLevels
-from idbench.identify.noise.restricted_likelihood import likely, likely_levels
+from idbench.identify.noise.restricted_likelihood import least_level, likely, likely_levels, rms_torque
 from idbench.identify.noise.row_weights import floor_of, reciprocal_root
 from idbench.identify.noise.white_noise import count_noise, repeats, residual_level, torque_noise, white_noise
 from idbench.identify.rows.chain import Chain
@@ -39,6 +39,7 @@ def require_logs(logs: Sequence[object]) -> None:
 Reduced = TypeVar("Reduced")
 
 SAMPLED = 8  # Pieces of long logs from which noise is estimated and propagated
+SURE = 2.0  # Times that residuals must allow the noise that differences show for its likelihood not to be asked
 BEGIN, LEAST = (1.0, 0.1, 0.1), 1e-4  # Shares of the errors of rows of which one kind is not alike, to begin with, and at least
 
 
@@ -196,8 +197,23 @@ class Problem:
         """The white noise of torques and positions, from their differences; it is what `Estimate.noise_sigma` contains."""
         if self.explicit is not self:
             return self.explicit.noise
-        level = np.maximum(torque_noise(self.signals, self.likely_noise.torque), self._resolution)
-        return replace(self.likely_noise, torque=level)
+        shown = torque_noise(self.signals)
+        level = np.maximum(np.minimum(shown, self._allowed(shown)), self._resolution)
+        return NoiseLevels(level, self.position_noise, self.repeats)
+
+    def _allowed(self, shown: Array) -> Array:
+        """The noise of the torques that residuals allow [N m], as far as it decides: that of `likely_noise` costs half a fit."""
+        noisy = [part.noisy for part in self.parts]
+        least = least_level(rms_torque(noisy), self._resolution)
+        if (self._residual_level() <= least).all():
+            return least
+        positions = NoiseLevels(np.zeros_like(least), self.position_noise, self.repeats)
+        plenty = (SURE * shown <= self._residual_level(positions)).all()
+        return shown if plenty else self.likely_noise.torque
+
+    def _residual_level(self, others: NoiseLevels | None = None) -> Array:
+        rows, noisy = zip(*((part.rows, part.noisy) for part in self.parts), strict=True)
+        return residual_level(rows, noisy, self.some_rows.factors, self.start.X, others)
 
     @cached_property
     def likely_noise(self) -> NoiseLevels:
@@ -205,8 +221,8 @@ class Problem:
         if self.explicit is not self:
             return self.explicit.likely_noise
         rows, noisy = zip(*((part.unbiased, part.noisy) for part in self.parts), strict=True)
-        begin = residual_level(rows, noisy, self.some_rows.factors, self.start.X)
-        return likely_levels(rows, noisy, NoiseLevels(begin, self.position_noise, self.repeats), self._resolution)
+        begin = NoiseLevels(self._residual_level(), self.position_noise, self.repeats)
+        return likely_levels(rows, noisy, begin, self._resolution)
 
     @cached_property
     def _resolution(self) -> Array:

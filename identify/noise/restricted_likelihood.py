@@ -53,13 +53,22 @@ def likely_levels(
     """
     units = [each.units for each in noisy]
     joined = [rows.joined * each.kept[..., None] for rows, each in zip(parts, noisy, strict=True)]
-    tau = [each.to_rows.signals.torque.mean for each in noisy]
-    rms = np.sqrt(sum(np.mean(one**2, axis=-1) for one in tau) / len(parts))
-    least = np.maximum(np.maximum(EXACT * rms, resolution), 1e-12) ** 2
+    rms = rms_torque(noisy)
+    least = least_level(rms, resolution) ** 2
     torque = np.where(np.isfinite(start.torque), np.maximum(start.torque, LOWEST * rms), start.torque)
     position = np.broadcast_to(np.maximum(start.position, SMALLEST), torque.shape)
     squares = likely(units, joined, np.nan_to_num(torque**2), least, position**2)
     return NoiseLevels(np.where(np.isfinite(torque), np.sqrt(squares), np.nan), start.position, start.repeats)
+
+
+def rms_torque(noisy: Sequence[NoisyRows]) -> Array:
+    """The rms of the torques [N m], shape (..., joint)."""
+    return np.sqrt(sum(np.mean(each.to_rows.signals.torque.mean**2, axis=-1) for each in noisy) / len(noisy))
+
+
+def least_level(rms: Array, resolution: Array | float) -> Array:
+    """The least noise of torques of this rms and standard deviation of rounding that is believed [N m], shape (..., joint)."""
+    return np.maximum(np.maximum(EXACT * rms, resolution), 1e-12)
 
 
 def likely(

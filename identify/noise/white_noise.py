@@ -1,6 +1,6 @@
 """The white noise of a log, from differences of its positions and torques."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from math import comb
 from typing import Literal
 
@@ -10,7 +10,7 @@ import scipy
 from idbench.identify.arrays import Array
 from idbench.identify.data.jumps import ORDER, encoder_steps
 from idbench.identify.data.motion_log import MotionLog
-from idbench.identify.noise.propagation import NoisyRows
+from idbench.identify.noise.propagation import NoiseLevels, NoisyRows
 from idbench.identify.rows.factors import Factors
 from idbench.identify.rows.rows import Rows
 from idbench.identify.signals.filters import slide
@@ -70,25 +70,34 @@ MIN_SAMPLES = 32  # Samples that it takes to estimate noise
 EXACT = 1e-5  # Share of the torque's rms that counts as noise at least: no model of a robot is better
 
 
-def torque_noise(logs: Sequence[Signals], residual: Array) -> Array:
-    """Return the standard deviation of white noise in the torques [N m], shape (..., joint).
+def torque_noise(logs: Sequence[Signals]) -> Array:
+    """Return the standard deviation of white noise in the torques [N m], shape (..., joint), from differences, as of positions.
 
-    From differences of the torques, as of the positions, and not more than what residuals allow: a torque that is switched, or
-    that a controller makes of a rough position, has large differences without any noise. `residual` is the noise of the torques
-    that would explain residuals [N m], shape (..., joint).
+    Residuals may allow less: a torque that is switched, or that a controller makes of a rough position, has large differences
+    without any noise. Infinite for poses, of which residuals alone say something.
     """
-    if any(each.log.poses for each in logs):
-        return residual
     rms = np.sqrt(np.mean([np.mean(_logged(each, "tau") ** 2, axis=-1) for each in logs], axis=0))
-    return np.minimum(np.maximum(white_noise(logs, "tau"), EXACT * rms), residual)
+    poses = any(each.log.poses for each in logs)
+    return np.maximum(white_noise(logs, "tau"), EXACT * rms) + (np.inf if poses else 0.0)
 
 
-def residual_level(parts: Sequence[Rows], noisy: Sequence[NoisyRows], factors: Factors, X: Array) -> Array:
-    """Return the noise of torques that has the squares of the residuals, shape (..., joint) [N m], or NaN."""
+def residual_level(
+    parts: Sequence[Rows], noisy: Sequence[NoisyRows], factors: Factors, X: Array, others: NoiseLevels | None = None
+) -> Array:
+    """Return the noise of torques that has the squares of the residuals, less those of `others`, shape (..., joint) [N m].
+
+    0 where the others have more, NaN of joints without rows.
+    """
     one = np.ones(parts[0].kinds)
-    variances = (rows.by_kind(each.torque.variance(one)) for rows, each in zip(parts, noisy, strict=True))
-    squares = sum(np.sum(np.ascontiguousarray(variance), axis=-1) for variance in variances)
-    return np.sqrt(np.divide(factors.squares(X), squares, out=np.full(factors.rows.shape, np.nan), where=squares > 0))
+
+    def summed(variances: Iterable[Array]) -> Array | int:
+        each = zip(parts, variances, strict=True)
+        return sum(np.sum(np.ascontiguousarray(rows.by_kind(variance)), axis=-1) for rows, variance in each)
+
+    of_one = summed(each.torque.variance(one) for each in noisy)
+    left = factors.squares(X) - (summed(each.variance(others) for each in noisy) if others else 0)
+    found = np.divide(np.maximum(left, 0.0), of_one, out=np.full(factors.rows.shape, np.nan), where=np.asarray(of_one) > 0)
+    return np.sqrt(found)
 
 
 def white_noise(logs: Sequence[Signals], logged: Literal["q", "tau"]) -> Array:
