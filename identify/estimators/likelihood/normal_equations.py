@@ -175,7 +175,7 @@ class NormalEquations:
             nodes[there, :, p + 1 :] += products[:, rows, p:]
             for j in range(step):
                 k = half * step + j
-                columns[there, j, : width - k] += own[:, k:, k]
+                columns[there, j, : width - k] += own[:, k, k:]
         flat = W.reshape(-1, W.shape[-1])
         self.corner[:-1, :-1] += flat.T @ flat
         self.b_parameters[:-1] += flat.T @ rho.reshape(len(flat), -1)
