@@ -202,9 +202,8 @@ class Problem:
         return NoiseLevels(level, self.position_noise, self.repeats)
 
     def _allowed(self, shown: Array) -> Array:
-        """The noise of the torques that residuals allow [N m], as far as it decides: that of `likely_noise` costs half a fit."""
-        noisy = [part.noisy for part in self.parts]
-        least = least_level(rms_torque(noisy), self._resolution)
+        """The noise of the torques that residuals allow [N m], as far as it decides: `likely_noise` costs half a fit."""
+        least = least_level(rms_torque([part.noisy for part in self.parts]), self._resolution)
         if (self._residual_level() <= least).all():
             return least
         positions = NoiseLevels(np.zeros_like(least), self.position_noise, self.repeats)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.stats import wilcoxon
+import scipy
 
 from idbench.identify.arrays import Array
 from idbench.identify.servo.fit import CLUSTERS, ServoFit
@@ -104,4 +104,4 @@ def choose_friction(
 
 def p_value(one: Array, other: Array, tests: int) -> float:
     """P value of Wilcoxon's signed-rank test of paired costs, times the number of tests (Bonferroni)."""
-    return min(1.0, tests * float(wilcoxon(one, other).pvalue))
+    return min(1.0, tests * float(scipy.stats.wilcoxon(one, other).pvalue))

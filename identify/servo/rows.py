@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 
 import numpy as np
-from scipy.signal import butter
+import scipy
 
 from idbench.identify.arrays import Array
 from idbench.identify.servo.closed_loop import targets
@@ -27,7 +27,7 @@ def low_passed(x: Array, cutoff: float = CUTOFF) -> Array:
 
 @cache
 def _sections(cutoff: float) -> Array:
-    return np.asarray(butter(2, 2 * cutoff, output="sos"))
+    return np.asarray(scipy.signal.butter(2, 2 * cutoff, output="sos"))
 
 
 def smoothed(t: Array, q: Array, cutoff: float = CUTOFF) -> tuple[Array, Array, Array]:
