@@ -22,8 +22,9 @@ from idbench.identify import Array, AsLogged, LogError, MotionLog, RangeError, S
 from idbench.identify.data.log_columns import LogColumns
 from idbench.identify.data.resample import Repaired
 from idbench.identify.files.formats import read_table
-from idbench.identify.files.layout import LogLayout
-from idbench.identify.files.reading import LAYOUT_FILE, layout_of, read_columns
+from idbench.identify.files.guess_units import FARTHEST, SAY_UNIT
+from idbench.identify.files.layout import Asked, LogLayout
+from idbench.identify.files.reading import LAYOUT_FILE, read_columns
 from idbench.identify.judge.delay import DelayEstimate
 
 DELAY_FOUND = "delay"  # Mark of the note on a delay, which those leave out who print it beside the torque
@@ -87,7 +88,7 @@ def read(path: Path, options: LogRequest, robot_model: RobotModel | None, fallba
     Joints are in the order of the robot; without one in that of the file. `fallback` is what its torque means where neither
     the file nor options say it.
     """
-    columns, before = _ordered(path, columns_of(path, options.reading), robot_model)
+    columns, before = _ordered(path, read_columns(path, asked_of(options.reading)), robot_model)
     names = columns.names if robot_model is None else robot_model.robot.joints
     hinges = [True] * columns.n if robot_model is None else [joint.kind == "hinge" for joint in robot_model.tree.joints]
     stated = columns.torque or fallback
@@ -206,30 +207,24 @@ def late(read: ReadLog, channel: TorqueChannel) -> ReadLog:
     return replace(read, logs=tuple(logs))
 
 
-def columns_of(path: Path, options: ColumnOptions) -> LogColumns:
-    """Return the columns of a log, as the file beside it and the options say."""
-    if not options.stated:
-        return read_columns(path)
-    layout = LogLayout.read(options.layout) if options.layout else None
-    if layout is None:
-        beside = LogLayout.beside(path) if path.suffix.lower() != LAYOUT_FILE else (LogLayout.read(path), path)
-        layout = beside[0] if beside else layout_of(path)
-    for quantity, texts in (("columns", options.columns), ("unit", options.units)):
+def asked_of(options: ColumnOptions) -> Asked:
+    """What options say of a log's columns."""
+    found: dict[str, dict[str, Any]] = {"columns": {}, "units": {}}
+    for quantity, texts in (("columns", options.columns), ("units", options.units)):
         for text in texts:
             name, mark, value = text.partition("=")
             if name not in ("t", "q", "qd", "tau") or not mark or not value:
                 raise ExperimentError(f"--{quantity} {text}: give t=..., q=..., qd=... or tau=..., such as q=position_*")
-            given = tuple(value.split(",")) if quantity == "columns" else value
-            layout = layout.where(name, replace(getattr(layout, name), **{quantity: given}))
-    try:
-        _ = [getattr(layout, name).scale(name) for name in ("t", "q", "qd", "tau")]
-    except SettingError as error:
-        raise ExperimentError(f"--units: {error}") from error
+            found[quantity][name] = tuple(value.split(",")) if quantity == "columns" else value
     try:
         rows = {name: float(value) for name, _, value in (text.partition("=") for text in options.rows)}
     except ValueError:
         raise ExperimentError(f"--rows {' '.join(options.rows)}: give columns and numbers, such as episode_index=3") from None
-    return read_columns(path, replace(layout, gain=options.gain or layout.gain, rows={**layout.rows, **rows}))
+    layout = LogLayout.read(options.layout) if options.layout else None
+    try:
+        return Asked(layout, found["columns"], found["units"], rows, options.gain)
+    except SettingError as error:
+        raise ExperimentError(f"--units: {error}") from error
 
 
 def _joints_of(columns: LogColumns, robot_model: RobotModel) -> str:
@@ -246,6 +241,12 @@ def _turned(path: Path, q: Array, names: Sequence[str], hinges: Sequence[bool], 
     q = q.copy()
     for j, hinge in enumerate(hinges):
         jumps = np.abs(np.abs(np.diff(q[:, j])) - TURN) < NEARLY * TURN
+        if hinge and np.ptp(q[:, j]) > FARTHEST and np.nanmax(np.abs(np.diff(q[:, j])), initial=0.0) > TURN / 2:
+            most = np.nanmax(np.abs(q[:, j]))
+            raise ExperimentError(
+                f"{path}: {names[j]} reaches {most:.5g} rad, and moves by more than half a turn from one sample to the next: "
+                f"{SAY_UNIT}"
+            )
         if not hinge or not jumps.any():
             continue
         if not unwrap:

@@ -50,7 +50,8 @@ class ColumnOptions:
     columns: Texts = ()
     """Names of columns: t=time q=position_* tau=effort_* (* stands for numbers or names of joints; or a list with commas)."""
     units: Texts = ()
-    """Units: t=ms q=deg tau=mNm, or tau=A with --gain."""
+    """Units: t=ms q=deg tau=mNm, tau=A with --gain, q=count:131072@4194304 (counts of a turn, count at zero), tau=permille:2.4
+    (of the rated torque, N m), tau=V (a model in volts)."""
     rows: Texts = ()
     """Use only rows in which columns have these values: episode_index=3."""
     gain: Each = ()

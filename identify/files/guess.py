@@ -2,16 +2,15 @@
 
 import json
 import re
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from idbench.identify.errors import LogError
-from idbench.identify.files.formats import read_table
 from idbench.identify.files.guess_units import with_units
-from idbench.identify.files.layout import UNLOGGED, LogLayout, Source
+from idbench.identify.files.layout import UNLOGGED, Asked, LogLayout, Source
 from idbench.identify.files.table import LogTable
 
 WORDS = {
@@ -22,7 +21,7 @@ WORDS = {
 }
 """Words in the names of columns, by what they stand for; the first that is there holds."""
 
-OTHERS = "cmd command commanded des desired ref reference target set setpoint goal error ext"
+OTHERS = "cmd command commanded des desired ref reference target set setpoint goal error ext enable enabled"
 """Words of columns that are not what was measured."""
 
 EPISODES = ("episode_index", "episode", "run", "trial")  # Columns that distinguish the runs of a file
@@ -53,38 +52,38 @@ class UnknownColumnsError(LogError):
         return "\n\n".join([self.layout.text.rstrip(), *lines]) + "\n"
 
 
-@dataclass(frozen=True)
-class Guess:
-    """A layout that was guessed."""
-
-    layout: LogLayout
-    """What the columns probably are."""
-    doubts: tuple[str, ...] = ()
-    """What should be looked at."""
-
-
-def guess(path: Path, table: LogTable | None = None) -> Guess:
-    """Probable layout of the columns of a file, whose table may have been read already.
+def guess(path: Path, table: LogTable, asked: Asked = Asked()) -> tuple[LogLayout, list[str]]:  # noqa: B008  # frozen
+    """Return the probable layout of a file's columns, with what is asked of them in it, and doubts that nobody has settled.
 
     Raises
     ------
     LogError
-        If it cannot be read, or nothing in it looks like times, positions and torques.
+        If nothing in it looks like positions and torques.
     """
-    table = table or read_table(path)
-    if table.rows < FEWEST:
+    told = {"q", "tau"} <= set(asked.columns)
+    if table.rows < FEWEST and not told:
         raise LogError(f"{path} has {table.rows} rows: too few to say what its columns are")
-    found = _by_names(table) if table.named else _by_values(path, table)
+    found = _by_names(table) if table.named else LogLayout() if told else _by_values(path, table)
+    found = asked.over(replace(found, joints=() if "q" in asked.columns else found.joints))
     missing = [name for name in ("q", "tau") if not getattr(found, name).columns]
     if missing and not (missing == ["q"] and found.qd.columns):  # velocities alone: they are integrated
         what = " and ".join({"q": "positions", "tau": "torques or currents"}[name] for name in missing)
-        columns = tuple(table.columns)
-        said = f"nothing in {path} looks like {what}; its columns: {', '.join(columns[:40])}; say what they are in a log.toml"
+        columns, options = tuple(table.columns), " ".join(f"{name}=..." for name in missing)
+        said = f"nothing in {path} looks like {what}; its columns: {', '.join(columns[:40])}; say which: --columns {options}"
         raise UnknownColumnsError(said, found, columns)
-    episodes, doubts = _episodes(table)
-    doubts += _alike(table, found)
-    layout, more = with_units(replace(found, rows=episodes), table)
-    return Guess(layout, (*doubts, *more))
+    doubts = [] if told or table.named else [_nameless(table)]
+    if not asked.rows:
+        episodes, more = _episodes(table)
+        found, doubts = replace(found, rows={**found.rows, **episodes}), doubts + more
+    doubts += _alike(table, found, asked)
+    layout, more = with_units(found, table, asked)
+    return layout, doubts + more
+
+
+def _nameless(table: LogTable) -> str:
+    joints = max(1, (len(table.columns) - 1) // 2)
+    line = ",".join(["t", *(f"{x}{j + 1}" for x in ("q", "tau") for j in range(joints))])
+    return f"it has no header, its first line is numbers: put a line of names before it, such as {line}"
 
 
 def _episodes(table: LogTable) -> tuple[dict[str, float], list[str]]:
@@ -96,22 +95,23 @@ def _episodes(table: LogTable) -> tuple[dict[str, float], list[str]]:
     return {}, []
 
 
-def _alike(table: LogTable, found: LogLayout) -> list[str]:
+def _alike(table: LogTable, found: LogLayout, asked: Asked) -> list[str]:
     """Return doubts about columns that could have been taken in the place of others."""
-    groups, doubts = _groups(table), list[str]()
+    groups, doubts, free = _groups(table), list[str](), not {"q", "tau"} & set(asked.columns)
     motion = found.q if found.q.columns else found.qd
-    n, torques = (sum(1 if name == UNLOGGED else _entries(table, name) for name in of.columns) for of in (motion, found.tau))
-    if n != torques:
+    every = list(table.columns)
+    n, torques = (sum(_entries(table, x) for x in of.names(every)) + of.columns.count(UNLOGGED) for of in (motion, found.tau))
+    if n != torques and free:
         what = "positions" if found.q.columns else "velocities"
         doubts.append(f"{n} columns of {what} and {torques} of torques: one of each a joint")
     place = {name: place for names in groups.values() for name, place in names}
-    q, tau = ([place.get(name, "") for name in source.logged] for source in (motion, found.tau))
-    if n == torques and len(q) == len(tau) and set(q) != set(tau):
+    q, tau = ([place.get(name, "") for name in source.names(every)] for source in (motion, found.tau))
+    if free and n == torques and len(q) == len(tau) and set(q) != set(tau):
         doubts.append(f"positions are of {', '.join(q)}, torques of {', '.join(tau)}: are these the same joints?")
     rest = [name for (of, _), names in groups.items() for name, _ in names if of == "tau" and name not in found.tau.columns]
     if UNLOGGED in found.tau.columns and rest:
         doubts.append(f"some joints have no column of torques like {found.tau.logged[0]}: are they {', '.join(rest)}?")
-    for kind in ("t", "q", "tau"):
+    for kind in {"t", "q", "tau"} - set(asked.columns):
         chosen = set(getattr(found, kind).columns)
         for (of, _), names in groups.items():
             others = [name for name, _ in names]
@@ -198,7 +198,7 @@ def _parsed(name: str) -> _Name | None:
 
 
 def _entries(table: LogTable, name: str) -> int:
-    return 1 if table.columns[name].ndim == 1 else int(table.columns[name].shape[1])
+    return 1 if name not in table.columns or table.columns[name].ndim == 1 else int(table.columns[name].shape[1])
 
 
 def _sorted(names: list[tuple[str, str]], joints: tuple[str, ...]) -> list[tuple[str, str]]:

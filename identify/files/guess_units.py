@@ -6,31 +6,39 @@ from dataclasses import replace
 import numpy as np
 
 from idbench.identify.arrays import Array
-from idbench.identify.files.layout import LogLayout, Source
-from idbench.identify.files.table import SI, LogTable, factor, named_unit
+from idbench.identify.files.layout import Asked, LogLayout, Source
+from idbench.identify.files.table import SI, LogTable, factor, named_unit, needs_gain, read_unit
 
 CURRENTS = ("current", "currents", "cur", "amps")
 
+SAY_UNIT = "say its unit, --units q=deg, mrad, rev, or count:COUNTS_OF_A_TURN@COUNT_AT_ZERO"
 FARTHEST = 4 * np.pi  # Positions [rad] beyond which degrees are suspected
+MOST_DEGREES = 720.0  # Positions beyond which they are no degrees of an arm, which turns twice at most
 STRONGEST = 3e3  # Torques [N m] beyond which mN m are suspected
 
 
-def with_units(layout: LogLayout, table: LogTable) -> tuple[LogLayout, list[str]]:
-    """Return a layout with units by the names of columns, or else by the size of their values, and doubts."""
+def with_units(layout: LogLayout, table: LogTable, asked: Asked) -> tuple[LogLayout, list[str]]:
+    """Return a layout with units as asked, by the names of columns, or else by the size of their values, and doubts."""
     doubts = list[str]()
     for name in ("t", "q", "tau", "qd"):  # velocities last: their unit follows from those before
         source: Source = getattr(layout, name)
-        if not source.columns:
+        names = [column for column in source.names(list(table.columns)) if column in table.columns]
+        if not names or name in asked.units:
             continue
-        stated = named_unit(name, source.logged[0])
+        stated = named_unit(name, names[0])
         unit = stated or _suspected(name, layout, table)
-        if unit and not stated and unit != SI[name]:
-            doubts.append(f"{name} in {unit}? Its values, or names, look like it: identify needs --units {name}={unit}")
+        if name == "q" and not stated and (most := _largest(table, source)) > MOST_DEGREES:
+            doubts.append(f"q reaches {most:.5g}: {SAY_UNIT}")
+        elif unit and not stated and unit not in (SI[name], "A"):  # currents are asked for their gain
+            doubts.append(f"{name} in {unit}? Its values, or names, look like it: say --units {name}={unit}, or what it is in")
         layout = layout.where(name, replace(source, unit=unit))
-    if not layout.t.columns:
-        doubts.append("no column of times: state fs = ... [Hz] in [t]")
-    if layout.tau.unit in ("A", "mA"):
-        doubts.append("efforts in A: state gain = [...] in [torque], N m/A of each joint, gears included")
+    if not layout.t.columns and not layout.t.fs:
+        doubts.append("it has no column of times that idbench recognises: say which with --columns t=NAME, or state fs in [t]")
+    if needs_gain(layout.tau.unit) and not layout.gain:
+        unit = read_unit(layout.tau.unit)
+        doubts.append(
+            f"tau is in {layout.tau.unit}: say its gain, --gain N m/{unit} of each joint, gears included, or its unit"
+        )
     return layout, doubts
 
 
@@ -39,18 +47,19 @@ def _suspected(quantity: str, layout: LogLayout, table: LogTable) -> str:
     if quantity == "t":
         return unit_of_times(table.columns[layout.t.columns[0]])
     if quantity == "q":
-        return "deg" if _largest(table, layout.q) > FARTHEST else ""
+        return "deg" if FARTHEST < _largest(table, layout.q) <= MOST_DEGREES else ""
     if quantity == "qd":
         return _velocity_unit(table, layout)
-    if any(word in re.findall("[a-z]+", name.lower()) for name in layout.tau.logged for word in CURRENTS):
+    if any(word in re.findall("[a-z]+", name.lower()) for name in layout.tau.names(list(table.columns)) for word in CURRENTS):
         return "mA" if _largest(table, layout.tau) > STRONGEST / 10 else "A"
     return "mN m" if _largest(table, layout.tau) > STRONGEST else ""
 
 
 def _values(table: LogTable, source: Source) -> Array:
     """Return the columns of a source, shape (row, column), to the end of the shortest."""
-    rows = min(len(table.columns[name]) for name in source.logged)
-    return np.concatenate([table.columns[name][:rows].reshape(rows, -1) for name in source.logged], axis=1)
+    columns = [table.columns[name] for name in source.names(list(table.columns)) if name in table.columns]
+    rows = min(map(len, columns))
+    return np.concatenate([column[:rows].reshape(rows, -1) for column in columns], axis=1)
 
 
 def _largest(table: LogTable, source: Source) -> float:

@@ -10,9 +10,10 @@ from typing import Any, Self
 
 import numpy as np
 
+from idbench.identify.arrays import Array
 from idbench.identify.data.motion_log import TorqueChannel
 from idbench.identify.errors import IdentificationError, LogError
-from idbench.identify.files.table import SI, UNITS, factor
+from idbench.identify.files.table import SI, UNITS, factor, zero
 
 QUANTITIES = tuple(UNITS)
 """What columns may be. Of servos: commanded positions, what is commanded beside them, whether torque is on, and the supply."""
@@ -44,9 +45,21 @@ class Source:
         """Names of the columns that there are."""
         return tuple(name for name in self.columns if name != UNLOGGED)
 
+    def names(self, columns: Sequence[str]) -> list[str]:
+        """Return the columns of a file that it stands for."""
+        every = (
+            [pattern] if pattern in columns or "*" not in pattern else [name for name, _ in matching(pattern, columns)]
+            for pattern in self.logged
+        )
+        return [name for each in every for name in each]
+
     def scale(self, quantity: str) -> float:
         """Factor from its values to SI."""
         return factor(quantity, self.unit or SI[quantity])
+
+    def in_si(self, quantity: str, values: Array) -> Array:
+        """Return values in SI."""
+        return (values - zero(self.unit)) * self.scale(quantity)
 
 
 @dataclass(frozen=True)
@@ -174,6 +187,34 @@ class LogLayout:
         if self.rows:
             lines += ["", "[rows]", *(f"{json.dumps(name)} = {value!r}" for name, value in self.rows.items())]
         return "\n".join(lines).strip() + "\n"
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What is said of a log's columns beside its own words: it changes what it names, and nothing else."""
+
+    layout: LogLayout | None = None
+    """A layout in the place of that beside the log."""
+    columns: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    """Names of the columns of t, q, qd or tau."""
+    units: Mapping[str, str] = field(default_factory=dict)
+    """Their units."""
+    rows: Mapping[str, float] = field(default_factory=dict)
+    """Only rows in which these columns have these values."""
+    gain: tuple[float, ...] = ()
+    """Torque over what is logged."""
+
+    def __post_init__(self) -> None:
+        for quantity, unit in self.units.items():
+            factor(quantity, unit)
+
+    def over(self, layout: LogLayout) -> LogLayout:
+        """Return a layout with what is said here."""
+        for name, columns in self.columns.items():
+            layout = layout.where(name, replace(getattr(layout, name), columns=columns))
+        for name, unit in self.units.items():
+            layout = layout.where(name, replace(getattr(layout, name), unit=unit))
+        return replace(layout, gain=self.gain or layout.gain, rows={**layout.rows, **self.rows})
 
 
 def own_layout(log: Path) -> Path:

@@ -12,17 +12,15 @@ from idbench.identify.data.log_columns import LogColumns
 from idbench.identify.data.motion_log import TorqueChannel
 from idbench.identify.errors import LogError
 from idbench.identify.files.formats import read_table
-from idbench.identify.files.guess import guess, kind_of
-from idbench.identify.files.layout import LAYOUT, UNLOGGED, LogLayout, Source, matching
+from idbench.identify.files.guess import FEWEST, guess, kind_of
+from idbench.identify.files.guess_units import with_units
+from idbench.identify.files.layout import LAYOUT, UNLOGGED, Asked, LogLayout, Source, matching, own_layout
 from idbench.identify.files.table import SI, LogTable, needs_gain
 
-SHOWN = 20  # Columns of a file that a message names
 
-
-def standard_layout(path: Path, table: LogTable) -> LogLayout:
-    """Return the layout of a file whose columns are called as idbench calls them; raise LogError if they are not."""
+def standard_layout(path: Path, table: LogTable) -> LogLayout | None:
+    """Return the layout of a file whose columns are called as idbench calls them, all in SI units; None if they are not."""
     names = [*table.columns, *table.words]
-    _require_names(path, table)
     own = "q" if any(re.fullmatch(r"q(\d+|_.+)", name) for name in names) else "qd"  # velocities alone are integrated
     n = sum(bool(re.fullmatch(rf"{own}\d+", name)) for name in names)
     of_both = {name[1:] for name in names if name.startswith("q_")} & {name[3:] for name in names if name.startswith("tau_")}
@@ -43,12 +41,7 @@ def standard_layout(path: Path, table: LogTable) -> LogLayout:
     if any(torques) and not others and not unexpected:  # rows of joints without a torque are left out
         missing = [name for name in missing if not name.startswith("tau")]
     if missing or unexpected:
-        wrong = [f"{what} {', '.join(x)}" for what, x in (("missing:", missing), ("unexpected:", unexpected)) if x]
-        raise LogError(
-            f"{path} must have a header with the columns {', '.join(needed)}; {'; '.join(wrong)}; its columns: "
-            f"{', '.join(names[:SHOWN])}; or say what they are in a file log.toml beside it: idbench log {path} --write "
-            "makes one to start from"
-        )
+        return None
     qd = tuple(f"qd{end}" for end in ends)
     velocities = Source(qd) if set(qd) <= set(table.columns) else Source()
     q, tau = Source(tuple(f"q{end}" for end in ends) if own == "q" else ()), Source(torques)
@@ -57,82 +50,86 @@ def standard_layout(path: Path, table: LogTable) -> LogLayout:
     return LogLayout(Source(("t",)), q, tau, velocities, joints, temperature=Source(every))
 
 
-def _require_names(path: Path, table: LogTable) -> None:
-    """Raise LogError if the columns of a file have no names."""
-    if table.named:
-        return
-    joints = max(1, (len(table.columns) - 1) // 2)
-    line = ",".join(["t", *(f"{x}{j + 1}" for x in ("q", "tau") for j in range(joints))])
-    raise LogError(
-        f"{path} has no header, its first line is numbers: put a line of names before it, such as {line}, or say what its "
-        f"columns are in a file log.toml beside it: idbench log {path} --write makes one to start from"
-    )
-
-
 CLOCKS = 1e6  # Times [s] beyond this are those of a calendar: logs count from their beginning
 MIN_GAIN, MAX_GAIN = 1e-9, 1e9  # Sizes of gains beyond which they are slips
 LAYOUT_FILE = ".toml"  # What the name of a layout ends with, which may be given in the place of a log
 
 
-def read_columns(path: Path, layout: LogLayout | None = None) -> LogColumns:
+@dataclass(frozen=True, eq=False)
+class Understood:
+    """What is understood of a log, and by whose words."""
+
+    files: "LogFiles"
+    """Its files and their layout."""
+    doubts: tuple[str, ...] = ()
+    """What should be looked at."""
+    sure: bool = True
+    """Whether doubts are none that must be settled: the columns' names are those of idbench, or a layout says all."""
+    said: str = ""
+    """Which file says what the columns are; empty if that was the log itself."""
+
+    def columns(self) -> LogColumns:
+        """What the log holds; raise LogError that asks for what is not known."""
+        if self.doubts and not self.sure:
+            log, words = self.files.log, "; ".join(self.doubts)
+            raise LogError(f"{log}: {words}; or correct a layout: idbench log {log} --write makes {own_layout(log)}")
+        said = [self.said] if self.said else []
+        said += ["a model in volts: read V where N m stands; Fs is kS, Fv kV"] * (self.files.layout.tau.unit.upper() == "V")
+        return replace(self.files.columns, said="; ".join(said))
+
+
+def understood(path: Path, asked: Asked = Asked(), *, anew: bool = False) -> Understood:  # noqa: B008  # frozen
+    """Return what is understood of a log: by the layout beside it (not `anew`), by names of idbench's, or a guess.
+
+    Raises
+    ------
+    LogError
+        If it cannot be read, or nothing in it looks like positions and torques.
+    """
+    path = Path(path)
+    if path.suffix.lower() == LAYOUT_FILE:
+        layout = asked.layout or LogLayout.read(path)
+        files = [source.file for source in (layout.q, layout.t, layout.tau) if source.file]
+        if not files:
+            raise LogError(f'{path} names no file of the log: add a line such as file = "run.csv" before the tables')
+        return Understood(LogFiles(path.parent / files[0], path.parent, asked.over(layout)), said=layout.words(path))
+    if asked.layout:
+        return Understood(LogFiles(path, path.parent, asked.over(asked.layout)))
+    found, tables = None if anew else LogLayout.beside(path), dict[Path, LogTable]()
+    if not found or found[1].name == LAYOUT:
+        tables = {path: read_table(path)}
+        found = None if tables[path].torque is not None else found  # what idbench wrote is no log of that folder's recorder
+    if found:
+        return Understood(LogFiles(path, found[1].parent, asked.over(found[0]), tables), said=found[0].words(found[1]))
+    table = tables[path]
+    if standard := standard_layout(path, table):
+        layout = asked.over(standard)
+        looks = with_units(layout, table, asked)[1] if table.rows >= FEWEST and not table.words else []
+        return Understood(LogFiles(path, path.parent, layout, tables), tuple(looks))
+    layout, doubts = guess(path, table, asked)
+    sources = ((name, getattr(layout, name)) for name in ("t", "q", "qd", "tau"))
+    words = "; ".join(f"{name} [{of.unit or SI[name]}] = {', '.join(of.columns)}" for name, of in sources if of.columns)
+    return Understood(LogFiles(path, path.parent, layout, tables), tuple(doubts), False, f"columns by their names: {words}")
+
+
+def read_columns(path: Path, asked: Asked = Asked()) -> LogColumns:  # noqa: B008  # frozen
     """Return times, positions, torques and velocities of a log, whatever its times.
 
     Parameters
     ----------
     path : Path
         The log: CSV or other text, Parquet, NumPy, Matlab, a ROS bag; or a layout that names its files.
-    layout : LogLayout, optional
-        What its columns are; by default what `log.toml` beside it says, or columns t, q1, q2, ..., tau1, tau2, ... in SI units
-        (q_elbow, tau_elbow where joints have names), and qd1, qd2, ... if there are.
+    asked : Asked, optional
+        What is said of its columns; all else is as `log.toml` beside it says, or as columns are called: t, q1, q2, ..., tau1,
+        tau2, ... in SI units (q_elbow, tau_elbow where joints have names), and qd1, qd2, ... if there are; or other names that
+        leave no doubt.
 
     Raises
     ------
     LogError
-        If it cannot be read, or lacks a column.
+        If it cannot be read, lacks a column, or leaves a doubt that nobody has settled.
     """
-    path = Path(path)
-    if path.suffix.lower() == LAYOUT_FILE:
-        layout = layout or LogLayout.read(path)
-        files = [source.file for source in (layout.q, layout.t, layout.tau) if source.file]
-        if not files:
-            raise LogError(f'{path} names no file of the log: add a line such as file = "run.csv" before the tables')
-        return replace(LogFiles(path.parent / files[0], path.parent, layout).columns, said=layout.words(path))
-    if layout:
-        return LogFiles(path, path.parent, layout).columns
-    found, table = LogLayout.beside(path), None
-    if found and found[1].name == LAYOUT:
-        table = read_table(path)
-        found = None if table.torque is not None else found  # what idbench wrote is no log of that folder's recorder
-    if found:
-        return replace(LogFiles(path, found[1].parent, found[0]).columns, said=found[0].words(found[1]))
-    table = table or read_table(path)
-    layout, said = _undoubted(path, table)
-    return replace(LogFiles(path, path.parent, layout, {path: table}).columns, said=said)
-
-
-def _undoubted(path: Path, table: LogTable) -> tuple[LogLayout, str]:
-    """Return the layout of a file whose columns are called as idbench calls them, or whose names leave no doubt; and words."""
-    try:
-        return standard_layout(path, table), ""
-    except LogError as error:
-        try:
-            found = guess(path, table)
-        except LogError:
-            raise error from None
-        if found.doubts or not table.named or not found.layout.t.columns:
-            raise
-    sources = ((name, getattr(found.layout, name)) for name in ("t", "q", "qd", "tau"))
-    words = "; ".join(f"{name} [{of.unit or SI[name]}] = {', '.join(of.columns)}" for name, of in sources if of.columns)
-    return found.layout, f"columns by their names: {words}"
-
-
-def layout_of(path: Path) -> LogLayout:
-    """Return the layout of a file whose columns are called as idbench calls them, or the plain one of t, q*, tau*."""
-    table = read_table(path)
-    try:
-        return standard_layout(path, table)
-    except LogError:
-        return LogLayout()
+    return understood(path, asked).columns()
 
 
 @dataclass(frozen=True, eq=False)
@@ -285,7 +282,7 @@ class LogFiles:
             joints += [place for _, place in inside if not re.fullmatch(r"\d+", place)]
         if len({len(column) for column in columns}) != 1:
             raise LogError(f"{path}: columns {', '.join(source.columns)} of {quantity} differ in length")
-        values = np.stack(columns, axis=-1)[self._rows(path)] * source.scale(quantity)
+        values = source.in_si(quantity, np.stack(columns, axis=-1)[self._rows(path)])
         return values, tuple(joints) if len(joints) == len(columns) else ()
 
     def _require_once(self) -> None:
@@ -295,15 +292,14 @@ class LogFiles:
             source: Source = getattr(self.layout, quantity)
             path = self._path(source)
             names = list(self._table(path).columns) if source.columns else []
-            for pattern in source.logged:
-                for name in [pattern] if pattern in names or "*" not in pattern else [x for x, _ in matching(pattern, names)]:
-                    if other := used.get((path, name)):
-                        of = f"twice as {quantity}" if other == quantity else f"as {other} and as {quantity}"
-                        raise LogError(
-                            f"{path}: column {name!r} is named {of}: a column holds one quantity of one joint; correct the "
-                            f"columns in its log.toml, or with --columns {quantity}=...; its columns: {', '.join(names[:40])}"
-                        )
-                    used[path, name] = quantity
+            for name in source.names(names):
+                if other := used.get((path, name)):
+                    of = f"twice as {quantity}" if other == quantity else f"as {other} and as {quantity}"
+                    raise LogError(
+                        f"{path}: column {name!r} is named {of}: a column holds one quantity of one joint; correct the "
+                        f"columns in its log.toml, or with --columns {quantity}=...; its columns: {', '.join(names[:40])}"
+                    )
+                used[path, name] = quantity
 
     def times(self, source: Source, count: int) -> Array:
         """Return the times of a quantity [s]."""

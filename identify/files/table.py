@@ -16,8 +16,9 @@ POSITIONS = {"rad": 1.0, "deg": np.pi / 180, "mrad": 1e-3, "rev": 2 * np.pi, "m"
 """Units of positions in rad and m, by name."""
 
 VELOCITIES = {f"{unit}/s": size for unit, size in POSITIONS.items()} | {"rpm": 2 * np.pi / 60}  # [rad/s, m/s]
-TORQUES = {"N m": 1.0, "mN m": 1e-3, "kN m": 1e3, "N cm": 1e-2, "N": 1.0, "kN": 1e3, "A": 1.0, "mA": 1e-3, "%": 1e-2, "1": 1.0}
-"""Those that are no torques need a gain beside them."""
+TORQUES = {"N m": 1.0, "mN m": 1e-3, "kN m": 1e3, "N cm": 1e-2, "N": 1.0, "kN": 1e3, "A": 1.0, "mA": 1e-3}
+TORQUES |= {"%": 1e-2, "permille": 1e-3, "V": 1.0, "1": 1.0}
+"""Those that are no torques need a gain beside them; a model may be in volts."""
 
 UNITS: Mapping[str, Mapping[str, float]] = {
     "t": TIMES,
@@ -35,20 +36,65 @@ UNITS: Mapping[str, Mapping[str, float]] = {
 SI = {quantity: next(iter(units)) for quantity, units in UNITS.items()}
 """Units that are taken where a file states none; those of slides are m and N, which are of the same size."""
 
-NEED_GAIN = ("A", "mA", "%")  # Units of efforts that a gain makes torques [N m] of: gain is N m/A, or N m at 100 %
+NEED_GAIN = {"A": "A", "mA": "A", "%": "rated", "permille": "rated"}
+"""Units of efforts that a gain makes torques [N m] of, N m/A or N m at 100 %, and those in which such efforts are read."""
+
+OF_A_TURN = {"q": "count", "command": "count", "qd": "count/s"}  # Units of quantities whose size is said, counts a turn
+OF_RATED = ("%", "permille")  # Units of efforts whose size may be said: the rated torque [N m]
 
 
 def factor(quantity: str, unit: str) -> float:
-    """Factor from values in a unit to SI; raise SettingError if it is none of this quantity."""
-    known, plain = UNITS[quantity], _plain(unit)
-    if name := next((name for name in known if _plain(name) == plain), None):
-        return known[name]
-    raise SettingError(f"unit {unit!r} of {quantity} is unknown; known: {', '.join(known)}")
+    """Factor from values in a unit to SI.
+
+    A unit may have a size, count:131072 (a turn), permille:2.4 (N m rated), and its own value at zero, count:131072@4194304.
+
+    Raises
+    ------
+    SettingError
+        If it is none of this quantity, or its size or zero is no number.
+    """
+    known, (name, size, _) = UNITS[quantity], _parts(unit)
+    plain = _plain(name)
+    if plain == (counts := OF_A_TURN.get(quantity)):
+        if not size:
+            example = f"{counts}:131072, and perhaps the count at zero, {counts}:131072@4194304"
+            raise SettingError(f"unit {unit!r} of {quantity} needs the counts of a turn: {example}")
+        return 2 * np.pi / size
+    found = next((name for name in known if _plain(name) == plain), None)
+    if found is None:
+        more = [f"{counts}:COUNTS_OF_A_TURN"] if counts else []
+        raise SettingError(f"unit {unit!r} of {quantity} is unknown; known: {', '.join([*known, *more])}")
+    if size and found not in OF_RATED:
+        raise SettingError(f"unit {unit!r} of {quantity}: {found} has no size; leave :{size:g} out")
+    return known[found] * (size or 1.0)
+
+
+def zero(unit: str) -> float:
+    """What a unit's values are at zero, as in count:131072@4194304; 0 where it does not say."""
+    return _parts(unit)[2]
+
+
+def _parts(unit: str) -> tuple[str, float, float]:
+    """Name, size (0 if none) and zero of a unit."""
+    name, _, at = unit.partition("@")
+    name, mark, size = name.partition(":")
+    try:
+        found = name, float(size or 0), float(at or 0)
+    except ValueError:
+        raise SettingError(f"unit {unit!r}: after : and @ are numbers, as in count:131072@4194304") from None
+    if not np.isfinite(found[1:]).all() or found[1] < 0 or (mark and not found[1]):
+        raise SettingError(f"unit {unit!r}: its size must be above 0, and its zero finite")
+    return found
 
 
 def needs_gain(unit: str) -> bool:
     """True if an effort in this unit is no torque."""
     return _plain(unit) in [_plain(name) for name in NEED_GAIN]
+
+
+def read_unit(unit: str) -> str:
+    """Unit in which efforts are that need a gain: mA are read as A."""
+    return next(read for name, read in NEED_GAIN.items() if _plain(name) == _plain(unit))
 
 
 def named_unit(quantity: str, column: str) -> str:
@@ -61,6 +107,8 @@ def named_unit(quantity: str, column: str) -> str:
 def _plain(unit: str) -> str:
     """Return a unit without what people write differently: N m, Nm and N*m are one."""
     short = {"degrees": "deg", "degree": "deg", "seconds": "s", "sec": "s", "msec": "ms", "amps": "A", "ampere": "A"}
+    short |= {"percent": "%", "‰": "permille", "counts": "count", "ticks": "count", "tick": "count", "inc": "count"}
+    short |= {"counts/s": "count/s", "revs": "rev", "turns": "rev", "r/min": "rpm", "volt": "V", "volts": "V"}
     text = re.sub(r"[\s*·._-]", "", unit.strip()).replace("°", "deg").replace("µ", "u").replace("μ", "u")
     text = re.sub(r"(?<=[a-zA-Z])ps$", "/s", text) if text in ("radps", "degps", "mps") else text
     return short.get(text.lower(), text)

@@ -46,7 +46,7 @@ def test_what_cannot_be_followed_is_refused(whole, tmp_path, capsys):
     path = tmp_path / "bad.csv"
     path.write_text("".join(whole[:1]).replace("q1", "x") + "".join(whole[1:]))
     for words, complaint in (
-        ([str(path), *TORQUE, "--follow", "1"], f"{path} must have a header"),
+        ([str(path), *TORQUE, "--follow", "1"], f"{path}: 1 columns of positions and 2 of torques"),
         ([str(path), *TORQUE, "--follow", "0"], "--follow 0 must be above 0"),
         ([str(tmp_path / "log.parquet"), *TORQUE, "--follow", "1"], "only a CSV log"),
         ([str(tmp_path / "nothing.csv"), *TORQUE, "--follow", "0.1"], "nothing.csv"),

@@ -5,12 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from idbench.identify import LogError, MotionLog, TorqueChannel
+from idbench.identify import LogError, MotionLog, SettingError, TorqueChannel
 from idbench.identify.data.resample import Repaired
-from idbench.identify.files.guess import guess
-from idbench.identify.files.layout import LogLayout, Source, matching
+from idbench.identify.files.layout import Asked, LogLayout, Source, matching
 from idbench.identify.files.log_file import read_log, write_log
-from idbench.identify.files.reading import read_columns
+from idbench.identify.files.reading import read_columns, understood
 from idbench.identify.files.table import factor, named_unit
 
 
@@ -108,10 +107,81 @@ def test_points_of_a_trajectory_are_a_log(tmp_path):
     ],
     ids=["two groups of positions", "joints with other numbers"],
 )
-def test_columns_that_leave_a_doubt_need_a_header(letters, groups, doubt, tmp_path):
+def test_columns_that_leave_a_doubt_are_asked_for(letters, groups, doubt, tmp_path):
     numbers = [(2, 3, 4) if doubt == "the same joints?" and "effort" in letter else (1, 2, 3) for letter in letters]
     names = ["t", *(letter.format(j) for letter, joints in zip(letters, numbers, strict=True) for j in joints)]
     np.savetxt(tmp_path / "log.csv", np.c_[T, *groups], delimiter=",", header=",".join(names), comments="")
-    assert any(doubt in found for found in guess(tmp_path / "log.csv").doubts)
-    with pytest.raises(LogError, match="must have a header"):
+    assert any(doubt in found for found in understood(tmp_path / "log.csv").doubts)
+    with pytest.raises(LogError, match=doubt.replace("?", r"\?")):
         read_columns(tmp_path / "log.csv")
+
+
+def saved(path, names, values):
+    np.savetxt(path, values, delimiter=",", header=",".join(names), comments="", fmt="%.12g")
+    return path
+
+
+NAMED = "time,position_turn,position_lift,current_turn,current_lift"
+
+
+@pytest.fixture
+def named(tmp_path):
+    """A log whose names leave one doubt: its torques are currents."""
+    return saved(tmp_path / "named.csv", NAMED.split(","), np.c_[T, Q[:, :2], TAU[:, :2]])
+
+
+@pytest.mark.parametrize(
+    ("asked", "q", "tau"),
+    [
+        (Asked(gain=(1.0,)), 1.0, 1.0),
+        (Asked(units={"tau": "A"}, gain=(2.0, 2.0)), 1.0, 2.0),
+        (Asked(units={"tau": "mA", "t": "s"}, gain=(1.0,)), 1.0, 1e-3),
+        (Asked(columns={"tau": ("current_*",)}, units={"tau": "permille:2.4"}), 1.0, 2.4e-3),
+        (Asked(columns={"q": ("position_turn", "position_lift")}, units={"tau": "mNm", "q": "deg"}), np.pi / 180, 1e-3),
+    ],
+    ids=["gain", "units and gain", "mA", "columns and rated torque", "columns and units"],
+)
+def test_options_change_what_they_name_and_names_hold(named, asked, q, tau):
+    found = read_columns(named, asked)
+    np.testing.assert_allclose(found.t, T, atol=1e-12)
+    np.testing.assert_allclose(found.q, q * Q[:, :2])
+    np.testing.assert_allclose(found.tau, tau * TAU[:, :2])
+
+
+def test_what_is_missing_is_asked_for_with_the_layout_that_may_say_it(named):
+    with pytest.raises(LogError, match=r"tau is in A: say its gain, --gain N m/A.*--write makes .*named\.toml"):
+        read_columns(named)
+
+
+@pytest.mark.parametrize(
+    ("unit", "size", "zero"),
+    [
+        ("count:131072@4194304", 131072 / (2 * np.pi), 4194304),
+        ("mrad", 1e3, 0),
+        ("deg@180", 180 / np.pi, 180),
+        ("rev", 0.5 / np.pi, 0),
+    ],
+)
+def test_positions_in_other_units_are_asked_for_and_read(named, unit, size, zero):
+    raw = Q[:, :2] * size + zero
+    path = saved(named.parent / "raw.csv", NAMED.replace("current", "torque").split(","), np.c_[T, raw, TAU[:, :2]])
+    np.testing.assert_allclose(read_columns(path, Asked(units={"q": unit})).q, Q[:, :2], atol=1e-9)
+    if np.abs(raw).max() > 720:
+        with pytest.raises(LogError, match=r"q reaches .*: say its unit"):
+            read_columns(path)
+
+
+@pytest.mark.parametrize(
+    ("units", "complaint"),
+    [
+        ({"q": "count"}, "needs the counts of a turn"),
+        ({"q": "count:0"}, "above 0"),
+        ({"q": "count:x"}, "are numbers"),
+        ({"q": "deg:3"}, "has no size"),
+        ({"tau": "count:9"}, "is unknown"),
+        ({"q": "deg@nan"}, "finite"),
+    ],
+)
+def test_units_that_are_none_are_refused(units, complaint):
+    with pytest.raises(SettingError, match=complaint):
+        Asked(units=units)

@@ -12,21 +12,21 @@ from rich.text import Text
 from idbench.experiments.cli.options.tools import Export, Resample, ShowLog
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.logs import LogFacts
-from idbench.experiments.identification.reading import channel_of, columns_of, stated_by
+from idbench.experiments.identification.reading import asked_of, channel_of, stated_by
 from idbench.experiments.identification.robot_model import SCARA
 from idbench.experiments.program import program
 from idbench.experiments.results.attempts import Attempts
 from idbench.experiments.results.page import Page
 from idbench.experiments.results.writing import folder_for, new_file, require_free, write_text
 from idbench.experiments.text import new_table, print_titled
-from idbench.identify import LogError, MotionLog
+from idbench.identify import MotionLog
 from idbench.identify.data.log_columns import LogColumns
 from idbench.identify.data.resample import Repaired
-from idbench.identify.files.guess import Guess, UnknownColumnsError, guess
+from idbench.identify.files.guess import UnknownColumnsError
 from idbench.identify.files.layout import LAYOUT, LogLayout, Source, own_layout
 from idbench.identify.files.log_file import CSV, WRITTEN, read_log, write_log
-from idbench.identify.files.reading import LAYOUT_FILE, layout_of, read_columns
-from idbench.identify.files.table import needs_gain
+from idbench.identify.files.reading import Understood, read_columns, understood
+from idbench.identify.files.table import needs_gain, read_unit
 
 ROUNDED = 1e-4  # Departure of a step's logarithm from a whole number up to which it is a file's decimal places, no encoder's
 
@@ -38,11 +38,11 @@ def show_log(options: ShowLog) -> None:
         if path is not None:
             require_free(path, option, force=options.force, read=[options.log])
     found, columns = _understood(options)
-    layout, facts = found.layout, LogFacts(columns)
+    layout, facts = found.files.layout, LogFacts(columns)
     with closing(page):
         _print_layout(page, layout, found.doubts)
         raw = needs_gain(layout.tau.unit) and not layout.gain
-        _print_facts(page, facts, str(layout.tau.unit) if raw else "N m")
+        _print_facts(page, facts, read_unit(layout.tau.unit) if raw else "N m")
         for note in facts.notes():
             page.print(Text(note), soft_wrap=True)
         page.found |= {**facts.summary(), "layout": layout.text, "doubts": list(found.doubts)}
@@ -65,35 +65,21 @@ def _draw(page: Page, options: ShowLog, path: Path, facts: LogFacts) -> None:
     page.print(Text(f"picture written to {path}"), soft_wrap=True)
 
 
-def _understood(options: ShowLog) -> tuple[Guess, LogColumns]:
-    """Layout, stated or guessed, and columns."""
+def _understood(options: ShowLog) -> tuple[Understood, LogColumns]:
+    """What is understood of a log, and its columns; currents count as torques where their gain is not known yet."""
     path = options.log if options.log.name else options.log.resolve()  # the folder in which one is
-    if path.suffix.lower() == LAYOUT_FILE:
-        return Guess(LogLayout.read(path)), read_columns(path)
-    if options.reading.stated:
-        return Guess(layout_of(path)), columns_of(path, options.reading)
-    beside = None if options.force else LogLayout.beside(path)
-    if beside:
-        return Guess(beside[0]), read_columns(path, _currents_as_torques(beside[0]))
     try:
-        found = guess(path)
+        found = understood(path, asked_of(options.reading), anew=options.force)
     except UnknownColumnsError as error:
         if not options.write:
-            raise ExperimentError(f"{error}; --write makes one to correct") from error
+            raise ExperimentError(f"{error}; --write makes a layout to correct") from error
         write_text(own_layout(options.log), error.start, "--write", force=options.force)
         raise ExperimentError(f"{error}: {own_layout(options.log)} is one to correct") from error
-    except LogError as error:
-        raise ExperimentError(str(error)) from error
-    layout = found.layout
+    layout = found.files.layout
     if not layout.t.columns and not layout.t.fs:
-        none = f"{path} has no column of times that idbench recognises"
-        raise ExperimentError(f"{none}: say which with --columns t=NAME, or state fs in a log.toml")
-    return found, read_columns(path, _currents_as_torques(layout))
-
-
-def _currents_as_torques(layout: LogLayout) -> LogLayout:
-    """Return a layout whose currents count as torques where their gain is not known yet."""
-    return replace(layout, gain=(1.0,)) if needs_gain(layout.tau.unit) and not layout.gain else layout
+        raise ExperimentError(f"{path}: {found.doubts[-1]}")
+    raw = needs_gain(layout.tau.unit) and not layout.gain
+    return found, replace(found.files, layout=replace(layout, gain=(1.0,)) if raw else layout).columns
 
 
 def _print_layout(page: Page, layout: LogLayout, doubts: Sequence[str]) -> None:
@@ -146,7 +132,7 @@ def resample(options: Resample) -> None:
     if out.suffix.lower() == CSV and (out.parent / LAYOUT).is_file():
         raise ExperimentError(f"--out {out}: {LAYOUT} there would be taken for its columns: choose another folder, or .parquet")
     require_free(out, "--out", force=options.force, read=read)
-    columns, page = columns_of(options.log, options.reading), Page()
+    columns, page = read_columns(options.log, asked_of(options.reading)), Page()
     meaning = options.torque or (columns.torque.meaning if columns.torque else None)
     if meaning is None:
         raise ExperimentError(f"{options.log} does not say what its torque means: add --torque held, instantaneous or averaged")
