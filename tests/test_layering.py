@@ -31,7 +31,7 @@ ALLOWED_IN = {
     "experiments/cli/parser.py": {"cyclopts"},
     "identify/files/arrow.py": {"pyarrow"},
     "identify/files/log_file.py": {"pyarrow"},
-    "identify/files/formats.py": {"rosbags"},
+    "identify/files/ros_bag.py": {"rosbags"},
     "identify/telling.py": {"threadpoolctl"},
     "sim/scenario/scenario_file.py": {"tomli_w"},
     "sim/trajectories/recorded.py": {"scipy"},

@@ -13,6 +13,7 @@ import numpy as np
 from idbench.identify.arrays import Array
 from idbench.identify.errors import LogError
 from idbench.identify.files.lerobot import names_beside
+from idbench.identify.files.ros_text import ros_table
 from idbench.identify.files.table import LogTable, require_room
 
 if TYPE_CHECKING:
@@ -20,7 +21,10 @@ if TYPE_CHECKING:
 
 TORQUE = b"idbench.torque"  # Key of what a Parquet file says of its torque
 BOM = b"\xef\xbb\xbf"  # How some programs begin a file of UTF-8
+MOST_BEFORE = 100  # Lines before a table that are looked through for its beginning
 LARGEST = 2**53  # Integers up to this are numbers of double precision
+
+PRINTED = re.compile(rb"%time,|\d+,\d+,[^,]*,[A-Za-z_]")  # How text begins that ROS printed
 
 NUMBER = r"[-+.\deE,]*\d[-+.\deE,]*|[-+]?(nan|inf|infinity)"
 
@@ -47,13 +51,19 @@ def read_text(path: Path) -> LogTable:
     """Return the columns of a text file: CSV, with semicolons, tabs or blanks, with a line of names or without, packed or not.
 
     Without a line of names columns are called 1, 2, ...; lines that begin with # or % before the numbers are passed over,
-    the last of them may hold the names.
+    the last of them may hold the names; so are those of a drive's trace before its table.
     """
     pa = arrow()
     from pyarrow import csv
 
     try:
-        skipped, names, mark = _head(path)
+        with _opened(path) as file:
+            first_line = file.readline()
+            if PRINTED.match(first_line):
+                found = ros_table([first_line.decode("utf-8"), *file.read().decode("utf-8").splitlines()])
+                if found is not None:
+                    return found
+        skipped, names, mark, before = _head(path)
         if not names:
             _require_no_units(path, skipped, mark)
         if mark == b" ":
@@ -69,7 +79,8 @@ def read_text(path: Path) -> LogTable:
         raise LogError(f"cannot read the log {path} as CSV: {str(error).splitlines()[0]}") from error
     first = 1 + skipped + (0 if names else 1)
     values = (_numbers(column, first) for column in table.columns)
-    return _table(path, table.column_names, values, named=not names or not names[0].isdigit())
+    found = _table(path, table.column_names, values, named=not names or not names[0].isdigit())
+    return replace(found, said=f"{before} lines before its table are passed over" if before else "")
 
 
 def read_parquet(path: Path) -> LogTable:
@@ -105,20 +116,43 @@ def _held(path: Path) -> "pa.BufferReader":
     return pa.BufferReader(held)
 
 
-def _head(path: Path) -> tuple[int, list[str], bytes]:
-    """Number of lines to skip, names if the file has no line of them there, and the separator."""
+def _head(path: Path) -> tuple[int, list[str], bytes, int]:
+    """Number of lines to skip, names if the file has no line of them there, the separator, and lines that are no comments."""
     with _opened(path) as file:
         lines = [file.readline() for _ in range(200)]
     skipped = next((i for i, line in enumerate(lines) if line.strip() and line[:1] not in b"#%"), 0)
+    commented, skipped = skipped, _table_begins(lines, skipped)
+    before = skipped - commented
     first, comment = lines[skipped].removeprefix(BOM), lines[skipped - 1].lstrip(b"#% ") if skipped else b""
     mark = next((mark for mark in (b"\t", b";", b",", b" ") if mark in first.strip()), b",")
     if mark == b"," and len(blanks := first.split()) > 1 and all(re.fullmatch(rb"[-+]?\d+(,\d+)?", x) for x in blanks):
         mark = b" "  # decimal commas
     cells = _cells(first, mark)
     if not all(re.fullmatch(NUMBER, cell, re.IGNORECASE) for cell in cells if cell):
-        return skipped, [], mark
+        return skipped, [], mark, before
     named = _cells(comment, mark)
-    return skipped, named if len(named) == len(cells) else [str(i + 1) for i in range(len(cells))], mark
+    return skipped, named if len(named) == len(cells) else [str(i + 1) for i in range(len(cells))], mark, before
+
+
+def _table_begins(lines: Sequence[bytes], first: int) -> int:
+    """Place of the names of a table that begins after other lines: those above rows of numbers, of as many cells.
+
+    `first` where lines before have as many cells as those after, or none are numbers.
+    """
+
+    def size(k: int, mark: bytes) -> int:
+        return len(_cells(lines[k], mark)) if k < len(lines) and lines[k].strip() else 0
+
+    def numbers(k: int, mark: bytes) -> bool:
+        cells = [cell for cell in _cells(lines[k], mark) if cell]
+        return bool(cells) and all(re.fullmatch(NUMBER, cell, re.IGNORECASE) for cell in cells)
+
+    for mark in (b"\t", b";", b","):
+        for k in range(first, min(len(lines), MOST_BEFORE) - 2):
+            n = size(k, mark)
+            if n > 1 and n == size(k + 1, mark) == size(k + 2, mark) and numbers(k + 1, mark) and numbers(k + 2, mark):
+                return k
+    return first
 
 
 def _cells(line: bytes, mark: bytes) -> list[str]:

@@ -36,9 +36,7 @@ def with_units(layout: LogLayout, table: LogTable, asked: Asked) -> tuple[LogLay
         doubts.append("it has no column of times that idbench recognises: say which with --columns t=NAME, or state fs in [t]")
     if needs_gain(layout.tau.unit) and not layout.gain:
         unit = read_unit(layout.tau.unit)
-        doubts.append(
-            f"tau is in {layout.tau.unit}: say its gain, --gain N m/{unit} of each joint, gears included, or its unit"
-        )
+        doubts.append(f"tau is in {layout.tau.unit}: say its gain, --gain N m per {unit} of each joint, gears included")
     return layout, doubts
 
 

@@ -68,14 +68,20 @@ class Understood:
     said: str = ""
     """Which file says what the columns are; empty if that was the log itself."""
 
+    @property
+    def passed_over(self) -> list[str]:
+        """What of the files that were read was passed over."""
+        return [table.said for table in self.files.tables.values() if table.said]
+
     def columns(self) -> LogColumns:
         """What the log holds; raise LogError that asks for what is not known."""
         if self.doubts and not self.sure:
             log, words = self.files.log, "; ".join(self.doubts)
             raise LogError(f"{log}: {words}; or correct a layout: idbench log {log} --write makes {own_layout(log)}")
-        said = [self.said] if self.said else []
+        columns = self.files.columns
+        said = [*([self.said] if self.said else []), *self.passed_over]
         said += ["a model in volts: read V where N m stands; Fs is kS, Fv kV"] * (self.files.layout.tau.unit.upper() == "V")
-        return replace(self.files.columns, said="; ".join(said))
+        return replace(columns, said="; ".join(said))
 
 
 def understood(path: Path, asked: Asked = Asked(), *, anew: bool = False) -> Understood:  # noqa: B008  # frozen

@@ -36,7 +36,7 @@ UNITS: Mapping[str, Mapping[str, float]] = {
 SI = {quantity: next(iter(units)) for quantity, units in UNITS.items()}
 """Units that are taken where a file states none; those of slides are m and N, which are of the same size."""
 
-NEED_GAIN = {"A": "A", "mA": "A", "%": "rated", "permille": "rated"}
+NEED_GAIN = {"A": "A", "mA": "A", "%": "rated value", "permille": "rated value"}
 """Units of efforts that a gain makes torques [N m] of, N m/A or N m at 100 %, and those in which such efforts are read."""
 
 OF_A_TURN = {"q": "count", "command": "count", "qd": "count/s"}  # Units of quantities whose size is said, counts a turn
@@ -152,6 +152,8 @@ class LogTable:
     """Names of the entries of a column, where the file has them (joints of a JointState)."""
     words: Mapping[str, str] = field(default_factory=dict)
     """Columns that hold no numbers, and what they do hold."""
+    said: str = ""
+    """What of the file was passed over."""
 
     @property
     def rows(self) -> int:

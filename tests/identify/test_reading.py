@@ -7,6 +7,7 @@ import pytest
 
 from idbench.identify import LogError, MotionLog, SettingError, TorqueChannel
 from idbench.identify.data.resample import Repaired
+from idbench.identify.files.formats import read_table
 from idbench.identify.files.layout import Asked, LogLayout, Source, matching
 from idbench.identify.files.log_file import read_log, write_log
 from idbench.identify.files.reading import read_columns, understood
@@ -99,6 +100,101 @@ def test_points_of_a_trajectory_are_a_log(tmp_path):
         np.testing.assert_allclose(values, expected, atol=1e-9)
 
 
+ARM, GRIPPER = ("base", "elbow", "wrist"), ("finger",)
+DEFINITIONS = {
+    "control_msgs/msg/JointTrajectoryControllerState": (
+        "std_msgs/Header header\nstring[] joint_names\ntrajectory_msgs/JointTrajectoryPoint reference\n"
+        "trajectory_msgs/JointTrajectoryPoint feedback"
+    ),
+    "control_msgs/msg/InterfaceValue": "string[] interface_names\nfloat64[] values",
+    "control_msgs/msg/DynamicJointState": (
+        "std_msgs/Header header\nstring[] joint_names\ncontrol_msgs/InterfaceValue[] interface_values"
+    ),
+    "legs/msg/MotorState": "float32 q\nfloat32 dq\nfloat32 tau_est",
+    "legs/msg/LowState": "legs/MotorState[3] motor_state",
+    "own/msg/Arm": "float64[] position\nfloat64[] effort",
+}
+
+
+def rows_of(kind, store, header):
+    """Return messages of each instant, of a kind."""
+    point = store.types["trajectory_msgs/msg/JointTrajectoryPoint"]
+    none, after = np.zeros(0), store.types["builtin_interfaces/msg/Duration"](sec=0, nanosec=0)
+    made = store.types[kind]
+    for t, q, qd, tau in zip(T, Q, QD, TAU, strict=True):
+        head = header(t)
+        if kind.endswith("JointState") and "Dynamic" not in kind:
+            yield t, made(head, list(ARM), q, qd, tau)
+            if round(100 * t) % 5 == 0:
+                yield t, made(head, list(GRIPPER), q[:1], qd[:1], tau[:1])
+        elif "Controller" in kind:
+            yield t, made(head, list(ARM), point(q + 0.01, qd, none, none, after), point(q, qd, none, tau, after))
+        elif "Dynamic" in kind:
+            each = store.types["control_msgs/msg/InterfaceValue"]
+            names = ["effort", "position", "velocity"]
+            yield t, made(head, list(ARM), [each(names, np.array(x)) for x in zip(tau, q, qd, strict=True)])
+        elif "LowState" in kind:
+            yield t, made([store.types["legs/msg/MotorState"](*map(float, x)) for x in zip(q, qd, tau, strict=True)])
+        else:
+            yield t, made(q, tau)
+
+
+@pytest.mark.parametrize(
+    "kind", ["sensor_msgs/msg/JointState", *[x for x in DEFINITIONS if not x.endswith(("Value", "MotorState"))]]
+)
+def test_messages_are_read_by_their_fields(kind, tmp_path):
+    rosbag2 = pytest.importorskip("rosbags.rosbag2")
+    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    for name, text in DEFINITIONS.items():
+        store.register(get_types_from_msg(text, name))
+    stamp = store.types["builtin_interfaces/msg/Time"]
+
+    def header(t):
+        return store.types["std_msgs/msg/Header"](stamp(sec=1000 + int(t), nanosec=round((t - int(t)) * 1e9)), "base")
+
+    with rosbag2.Writer(tmp_path / "bag", version=9) as writer:
+        topic = writer.add_connection("/topic", kind, typestore=store)
+        for t, message in rows_of(kind, store, header):
+            writer.write(topic, round(1e9 * (1000 + t)), store.serialize_cdr(message, kind))
+    table, columns = read_table(tmp_path / "bag"), read_columns(tmp_path / "bag")
+    single = 1e-6 if "LowState" in kind else 1e-9  # numbers of single precision
+    for values, expected in ((columns.t, T), (columns.q, Q), (columns.tau, TAU)):
+        np.testing.assert_allclose(values, expected, atol=single)
+    if kind.endswith("/JointState"):
+        assert columns.joints == ARM
+        assert "20 messages that do not name base, elbow, wrist are left out" in columns.said
+    if "Controller" in kind:
+        np.testing.assert_allclose(table.columns["command"], Q + 0.01)
+
+
+@pytest.mark.parametrize("printed", ["rostopic", "ros2"])
+def test_messages_that_ros_printed_are_read(printed, tmp_path):
+    header = "%time,field.header.seq,field.header.stamp,field.header.frame_id"
+    fields = ("name", "position", "velocity", "effort")
+    lines = [",".join([header, *(f"field.{x}{j}" for x in fields for j in range(3))])] if printed == "rostopic" else []
+    for k, (t, *values) in enumerate(zip(T, Q, QD, TAU, strict=True)):
+        ns = 1_700_000_000_000_000_000 + round(1e9 * t)
+        stamp = f"{ns + 1234},{k},{ns}," if printed == "rostopic" else f"{ns // 10**9},{ns % 10**9},"
+        lines.append(",".join([stamp, *ARM, *(repr(float(x)) for each in values for x in each)]))
+    (tmp_path / "log.csv").write_text("\n".join(lines) + "\n")
+    columns = read_columns(tmp_path / "log.csv")
+    assert columns.joints == ARM
+    for values, expected in ((columns.t, T), (columns.q, Q), (columns.qd, QD), (columns.tau, TAU)):
+        np.testing.assert_allclose(values, expected, atol=1e-9)
+
+
+def test_the_table_of_a_drives_trace_is_found_and_what_is_before_it_said(tmp_path):
+    rows = [f"{1e3 * t:.3f};{q[0]:.9f};{tau[0]:.9f}".replace(".", ",") for t, q, tau in zip(T, Q, TAU, strict=True)]
+    text = ["Drive trace", "Date: 2020-03-16 17:04:51", "Amplifier;MR-J4", "", "Time [ms];Position [rad];Torque [Nm]", *rows]
+    (tmp_path / "trace.csv").write_text("\n".join(text) + "\n")
+    columns = read_columns(tmp_path / "trace.csv")
+    assert "4 lines before its table are passed over" in columns.said
+    for values, expected in ((columns.t, T), (columns.q, Q[:, :1]), (columns.tau, TAU[:, :1])):
+        np.testing.assert_allclose(values, expected, atol=1e-6)
+
+
 @pytest.mark.parametrize(
     ("letters", "groups", "doubt"),
     [
@@ -149,7 +245,7 @@ def test_options_change_what_they_name_and_names_hold(named, asked, q, tau):
 
 
 def test_what_is_missing_is_asked_for_with_the_layout_that_may_say_it(named):
-    with pytest.raises(LogError, match=r"tau is in A: say its gain, --gain N m/A.*--write makes .*named\.toml"):
+    with pytest.raises(LogError, match=r"tau is in A: say its gain, --gain N m per A.*--write makes .*named\.toml"):
         read_columns(named)
 
 

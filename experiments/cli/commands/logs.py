@@ -43,7 +43,7 @@ def show_log(options: ShowLog) -> None:
         _print_layout(page, layout, found.doubts)
         raw = needs_gain(layout.tau.unit) and not layout.gain
         _print_facts(page, facts, read_unit(layout.tau.unit) if raw else "N m")
-        for note in facts.notes():
+        for note in (*found.passed_over, *facts.notes()):
             page.print(Text(note), soft_wrap=True)
         page.found |= {**facts.summary(), "layout": layout.text, "doubts": list(found.doubts)}
         page.end()
