@@ -33,7 +33,9 @@ class LogFacts:
 
     @cached_property
     def log(self) -> MotionLog:
-        """Its longest piece."""
+        """Its longest piece; samples by themselves as they are."""
+        if self.columns.qdd is not None:
+            return MotionLog(1.0, self.columns.q, self.columns.tau, TorqueChannel("instantaneous"), poses=True)
         return max(self.repaired.logs, key=lambda log: log.samples)
 
     @cached_property
@@ -62,6 +64,9 @@ class LogFacts:
 
     def notes(self) -> Iterator[str]:
         """Yield what is worth knowing of the whole log."""
+        if self.columns.qdd is not None:
+            yield "samples by themselves: times do not count"
+            return
         yield from self.repaired.words(self.columns.names)
         yield f"torques exceed their noise up to {content_end(self.log):.3g} Hz"
         absent = self.columns.missing
@@ -75,6 +80,8 @@ class LogFacts:
 
     def summary(self) -> dict[str, Any]:
         """Content of --json."""
+        if self.columns.qdd is not None:
+            return {"rows": len(self.columns.t), "joints": self.rows, "notes": list(self.notes())}
         clock = self.repaired.clock
         return {
             "fs": self.log.fs,

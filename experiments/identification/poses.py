@@ -56,13 +56,17 @@ def poses_of(columns: LogColumns, channel: TorqueChannel) -> tuple[MotionLog, st
     """Return rows as poses at rest, and a note."""
     step = float(np.median(np.diff(columns.t))) if len(columns.t) > 1 else 1.0
     plain = TorqueChannel("instantaneous", gain=channel.gain)
-    sound = np.isfinite(columns.q).all(axis=1) & np.isfinite(columns.tau).all(axis=1)
+    motion = () if columns.qdd is None or columns.qd is None else (columns.qd, columns.qdd)
+    sound = np.logical_and.reduce([np.isfinite(x).all(axis=1) for x in (columns.q, columns.tau, *motion)])
     if not sound.any():
         raise ExperimentError("no row has a value of every position and torque")
-    q, tau = columns.q[sound], columns.tau[sound]
+    q, tau, *states = (x[sound] for x in (columns.q, columns.tau, *motion))
     conditions = {name: x[sound] if len(x) > 1 else x for name, x in columns.conditions.items()}
-    log = MotionLog(1 / step if step > 0 else 1.0, q, tau, plain, conditions, missing=columns.missing, poses=True)
+    fs, state = 1 / step if step > 0 else 1.0, (states[0], states[1]) if states else None
+    log = MotionLog(fs, q, tau, plain, conditions, missing=columns.missing, poses=True, motion=state)
     left_out = f"; {np.count_nonzero(~sound)} rows without a value somewhere are left out" if not sound.all() else ""
+    if motion:
+        return log, f"{log.samples} rows are taken as samples by themselves: times, delays and filters do not count{left_out}"
     smooth = "" if _jump_about(q) else "; they continue each other: are they of motion? Then leave --poses out"
     return log, (
         f"{log.samples} rows are taken as poses at rest: they show gravity alone, and the friction that holds a joint is part "
@@ -73,12 +77,17 @@ def poses_of(columns: LogColumns, channel: TorqueChannel) -> tuple[MotionLog, st
 def of_poses(request: Request, logs: Sequence[MotionLog], *, band: bool, sought: str | None) -> Request:
     """Return the request of logs of poses; raise ExperimentError if a chain or a delay was asked for, or some logs move."""
     if not all(log.poses for log in logs):
-        raise ExperimentError("some logs are of poses at rest, others of motion: identify them one by one")
+        raise ExperimentError(
+            "some logs are of poses at rest or samples by themselves, others of motion: identify them one by one"
+        )
     if not band:
-        raise ExperimentError("rows that are poses at rest have no band: leave --chain, --chain-file and --cutoff out")
+        raise ExperimentError("rows by themselves have no band: leave --chain, --chain-file and --cutoff out")
     if sought:
-        raise ExperimentError(f"--torque-delay {sought}: poses at rest show no delay; leave it out")
-    models = ("explicit",) if len(request.models) > 1 else request.models  # at rest all have its equations, or none
+        raise ExperimentError(f"--torque-delay {sought}: rows by themselves show no delay; leave it out")
+    # At rest all models have the equations of the explicit one, or none; of samples only this one needs no derivative.
+    models = ("explicit",) if len(request.models) > 1 else request.models
+    if any(log.motion for log in logs) and models != ("explicit",):
+        raise ExperimentError(f"--model {models[0]}: samples by themselves have no derivatives in time: use the explicit model")
     request = replace(request.with_chain(poses_chain(), POSES), models=models)
     size = np.linalg.norm(request.problem(logs).factors.R[..., :-1], axis=(0, 1))
     unseen = [name for name, x in zip(request.robot_model.basis.names, size, strict=True) if x <= NOTHING * size.max()]

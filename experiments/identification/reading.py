@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+import idbench.experiments.recording.log_table  # noqa: F401  # which adds a format
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.logs import DELAYS, with_delay
 from idbench.experiments.identification.poses import are_poses, poses_of
@@ -93,10 +94,11 @@ def read(path: Path, options: LogRequest, robot_model: RobotModel | None, fallba
     hinges = [True] * columns.n if robot_model is None else [joint.kind == "hinge" for joint in robot_model.tree.joints]
     stated = columns.torque or fallback
     channel = channel_of(stated, _meaning(path, options, stated), options.torque_delay)
-    poses = are_poses(path, columns, stated=options.reading.poses)
+    poses = columns.qdd is not None or are_poses(path, columns, stated=options.reading.poses)
     if not np.any(columns.tau) and np.ptp(columns.q, axis=0).any():
         raise ExperimentError(f"{path}: all torques are 0: there is nothing to identify")
-    columns = replace(columns, q=_turned(path, columns.q, names, hinges, options.unwrap))
+    if columns.qdd is None:
+        columns = replace(columns, q=_turned(path, columns.q, names, hinges, options.unwrap))
     assumed = options.torque_delay is None and stated is None and not options.reading.simulated
     notes = [columns.said] if columns.said else []
     absent = ", ".join(names[j] for j in columns.missing)
@@ -213,8 +215,10 @@ def asked_of(options: ColumnOptions) -> Asked:
     for quantity, texts in (("columns", options.columns), ("units", options.units)):
         for text in texts:
             name, mark, value = text.partition("=")
-            if name not in ("t", "q", "qd", "tau") or not mark or not value:
-                raise ExperimentError(f"--{quantity} {text}: give t=..., q=..., qd=... or tau=..., such as q=position_*")
+            if name not in ("t", "q", "qd", "qdd", "tau") or not mark or not value:
+                raise ExperimentError(
+                    f"--{quantity} {text}: give t=..., q=..., qd=..., qdd=... or tau=..., such as q=position_*"
+                )
             found[quantity][name] = tuple(value.split(",")) if quantity == "columns" else value
     try:
         rows = {name: float(value) for name, _, value in (text.partition("=") for text in options.rows)}
@@ -222,7 +226,7 @@ def asked_of(options: ColumnOptions) -> Asked:
         raise ExperimentError(f"--rows {' '.join(options.rows)}: give columns and numbers, such as episode_index=3") from None
     layout = LogLayout.read(options.layout) if options.layout else None
     try:
-        return Asked(layout, found["columns"], found["units"], rows, options.gain)
+        return Asked(layout, found["columns"], found["units"], rows, options.gain, options.samples)
     except SettingError as error:
         raise ExperimentError(f"--units: {error}") from error
 

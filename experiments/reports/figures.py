@@ -103,6 +103,8 @@ def friction_figure(fit: Fit) -> str:
 def spectra_figure(fit: Fit) -> str:
     """Return spectra of what the first model leaves, and of the noise that was found, joint by joint; of the first log."""
     form = next(iter(fit.estimates))
+    if fit.logs.fitted[0].poses:  # rows by themselves, of which there is no spectrum
+        return ""
     every = [found for found in spectra(fit, residual_instants(fit, [form])) if found.lines[form].max()]  # of joints that move
     panels = list[Panel]()
     for found in every:

@@ -62,6 +62,9 @@ class ColumnOptions:
     simulated: bool = False
     """The log is of MuJoCo's simulation of the robot's file by the file's own actuators, joint torques (qfrc_actuator) logged
     before each step: what the integrator makes of damping is taken out. Default: where that is evident from the file."""
+    samples: bool = False
+    """Each row is a sample by itself, with q, qd and qdd (what is missing is 0): times do not count, nothing is filtered or
+    differentiated. Default: a file without times that has accelerations is of samples."""
     poses: bool = False
     """Each row is a pose at rest, by itself: gravity alone is identified, by chain poses. Default: rows that are 0.5 s apart
     and do not continue each other are poses."""
@@ -69,7 +72,7 @@ class ColumnOptions:
     @property
     def stated(self) -> bool:
         """Whether they say anything of columns."""
-        return bool(self.layout or self.columns or self.units or self.gain or self.rows)
+        return bool(self.layout or self.columns or self.units or self.gain or self.rows or self.samples)
 
 
 @dataclass(frozen=True)

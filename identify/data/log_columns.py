@@ -28,6 +28,8 @@ class LogColumns:
     """Names of the joints, where the columns have them."""
     qd: Array | None = None
     """Logged velocities [rad/s], shape (time, joint)."""
+    qdd: Array | None = None
+    """Accelerations of samples that are by themselves [rad/s^2], shape (time, joint): the log has no times, or none count."""
     t_tau: Array | None = None
     """Times of the torques, where they are others than those of the positions [s], shape (time of torques,)."""
     temperature: Array | None = None
@@ -58,9 +60,9 @@ class LogColumns:
 
     def rows(self, kept: slice | npt.NDArray[np.intp]) -> Self:
         """Return the columns at some of their times; torques that have times of their own stay whole."""
-        qd, warm = (None if x is None else x[kept] for x in (self.qd, self.temperature))
+        qd, qdd, warm = (None if x is None else x[kept] for x in (self.qd, self.qdd, self.temperature))
         tau = self.tau[kept] if self.t_tau is None else self.tau
-        return replace(self, t=self.t[kept], q=self.q[kept], tau=tau, qd=qd, temperature=warm)
+        return replace(self, t=self.t[kept], q=self.q[kept], tau=tau, qd=qd, qdd=qdd, temperature=warm)
 
     def prefixed(self, joints: Sequence[str]) -> str:
         """Common prefix of the log's names that those of `joints` lack, as in fer_joint1, or else ""."""
@@ -91,7 +93,7 @@ class LogColumns:
         if not self.joints:
             return self
         place = [self.joints.index(joint) for joint in joints]
-        qd = None if self.qd is None else self.qd[:, place]
+        qd, qdd = (None if x is None else x[:, place] for x in (self.qd, self.qdd))
         warm = self.temperature
         if warm is not None and warm.shape[1] > 1:
             warm = warm[:, place]
@@ -101,6 +103,7 @@ class LogColumns:
             q=self.q[:, place],
             tau=self.tau[:, place],
             qd=qd,
+            qdd=qdd,
             torque=torque,
             temperature=warm,
             joints=tuple(joints),

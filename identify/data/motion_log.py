@@ -114,7 +114,9 @@ class MotionLog:
     missing: tuple[int, ...] = ()
     """Joints, from 0, whose torques were not logged: whatever `tau` has there, no row is made of it."""
     poses: bool = False
-    """Whether each sample is a pose at rest, by itself: there are no velocities, and nothing between two samples."""
+    """Whether each sample is by itself, with nothing between two: a pose at rest, or a state of `motion`."""
+    motion: tuple[Array, Array] | None = None
+    """Velocities [rad/s] and accelerations [rad/s^2] of samples that are by themselves, shape (..., time, joint) each."""
 
     def __repr__(self) -> str:
         runs = f"{np.prod(self.q.shape[:-2], dtype=int)} runs of " if self.q.ndim > 2 else ""
@@ -146,6 +148,8 @@ class MotionLog:
                     f"{name} is {values.flat[np.abs(values).argmax()]:.3g} at some instant, more than {largest:.0e}, which is "
                     "impossible: are columns exchanged, or is this a mark for missing samples?"
                 )
+        for name, values in zip(("qd", "qdd"), self.motion or (), strict=False):
+            _require_finite(name, values)
         object.__setattr__(self, "conditions", {name: self._condition(name, x) for name, x in self.conditions.items()})
         if len(self.joints) not in (0, self.n):
             raise LogError(f"{len(self.joints)} names for {self.n} joints: {', '.join(self.joints)}")
@@ -188,7 +192,8 @@ class MotionLog:
     def part(self, first: int, end: int) -> "MotionLog":
         """Return the samples `first` ... `end` - 1 as a log of its own."""
         q, tau, *others = (x[..., first:end, :] for x in (self.q, self.tau, *self.conditions.values()))
-        return replace(self, q=q, tau=tau, conditions=dict(zip(self.conditions, others, strict=True)))
+        motion = self.motion and (self.motion[0][..., first:end, :], self.motion[1][..., first:end, :])
+        return replace(self, q=q, tau=tau, conditions=dict(zip(self.conditions, others, strict=True)), motion=motion)
 
     def run(self, i: tuple[int | slice | list[int], ...]) -> "MotionLog":
         """Return one of independent runs, or some of them, as a log of its own."""

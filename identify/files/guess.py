@@ -14,6 +14,7 @@ from idbench.identify.files.layout import UNLOGGED, Asked, LogLayout, Source
 from idbench.identify.files.table import LogTable
 
 WORDS = {
+    "qdd": "qdd ddq qpp acc acceleration accelerations joint_acceleration",
     "t": "t time timestamp timestamps stamp stamps clock zeit sec secs seconds elapsed",
     "qd": "qd dq qp qdot vel velocity velocities velo speed speeds omega joint_velocity",
     "tau": "tau torque torques effort efforts eff trq current currents cur moment moments load amps tauj",
@@ -71,6 +72,8 @@ def guess(path: Path, table: LogTable, asked: Asked = Asked()) -> tuple[LogLayou
         columns, options = tuple(table.columns), " ".join(f"{name}=..." for name in missing)
         said = f"nothing in {path} looks like {what}; its columns: {', '.join(columns[:40])}; say which: --columns {options}"
         raise UnknownColumnsError(said, found, columns)
+    free = not found.t.columns and not found.t.fs
+    found = replace(found, samples=found.samples or (free and bool(found.qdd.columns)))
     doubts = [] if told or table.named else [_nameless(table)]
     if not asked.rows:
         episodes, more = _episodes(table)
@@ -106,7 +109,7 @@ def _alike(table: LogTable, found: LogLayout, asked: Asked) -> list[str]:
         doubts.append(f"{n} columns of {what} and {torques} of torques: one of each a joint")
     place = {name: place for names in groups.values() for name, place in names}
     q, tau = ([place.get(name, "") for name in source.names(every)] for source in (motion, found.tau))
-    if free and n == torques and len(q) == len(tau) and set(q) != set(tau):
+    if free and n == torques == len(q) == len(tau) and set(q) != set(tau):  # columns of several entries have no places
         doubts.append(f"positions are of {', '.join(q)}, torques of {', '.join(tau)}: are these the same joints?")
     rest = [name for (of, _), names in groups.items() for name, _ in names if of == "tau" and name not in found.tau.columns]
     if UNLOGGED in found.tau.columns and rest:
@@ -125,14 +128,14 @@ def _by_names(table: LogTable) -> LogLayout:
     """Return a layout by what columns are called."""
     groups, places = _groups(table), list[str]()
     found, n = LogLayout(q=Source(), tau=Source()), 0
-    for kind in ("t", "q", "tau", "qd"):
+    for kind in ("t", "q", "tau", "qd", "qdd"):
         choices = {stem: names for (k, stem), names in groups.items() if k == kind}
         if kind == "t":
             found = replace(found, t=Source((next(iter(choices.values()))[0][0],)) if choices else Source())
             continue
         counts = {stem: sum(_entries(table, name) for name, _ in names) for stem, names in choices.items()}
         best = next((stem for stem, count in counts.items() if count == n), None) if n else None
-        if best is None and kind != "qd" and counts:
+        if best is None and kind not in ("qd", "qdd") and counts:
             best = max(counts, key=lambda stem: counts[stem])
         if best is None:
             continue
@@ -178,6 +181,7 @@ def _groups(table: LogTable) -> dict[tuple[str, str], list[tuple[str, str]]]:
     for found in parsed:
         by_name = (found.kind, found.word) in named
         stem = found.word if by_name or not found.number else f"{found.word} {found.rest}"
+        stem = stem if _entries(table, found.name) == 1 else found.name
         groups.setdefault((found.kind, stem), []).append((found.name, found.place if by_name else found.number))
     return groups
 

@@ -32,7 +32,7 @@ def with_units(layout: LogLayout, table: LogTable, asked: Asked) -> tuple[LogLay
         elif unit and not stated and unit not in (SI[name], "A"):  # currents are asked for their gain
             doubts.append(f"{name} in {unit}? Its values, or names, look like it: say --units {name}={unit}, or what it is in")
         layout = layout.where(name, replace(source, unit=unit))
-    if not layout.t.columns and not layout.t.fs:
+    if not layout.t.columns and not layout.t.fs and not layout.samples:
         doubts.append("it has no column of times that idbench recognises: say which with --columns t=NAME, or state fs in [t]")
     if needs_gain(layout.tau.unit) and not layout.gain:
         unit = read_unit(layout.tau.unit)

@@ -74,6 +74,10 @@ class LogLayout:
     """Where torques are."""
     qd: Source = Source()  # frozen
     """Velocities; without columns if there are none."""
+    qdd: Source = Source()  # frozen
+    """Accelerations, of samples that are by themselves."""
+    samples: bool = False
+    """Whether rows are samples by themselves, with q, qd and qdd: times do not count."""
     joints: tuple[str, ...] = ()
     """Names of the joints, in the order of the columns."""
     torque: TorqueChannel | None = None
@@ -123,7 +127,7 @@ class LogLayout:
 
     @classmethod
     def _of(cls, stated: dict[str, Any]) -> Self:
-        _require_known("", stated, (*QUANTITIES, "joints", "torque", "rows", "file", "motors"))
+        _require_known("", stated, (*QUANTITIES, "joints", "torque", "rows", "file", "motors", "samples"))
         file = str(stated.get("file", ""))
         sources = {name: _source(name, stated[name], file) for name in QUANTITIES if name in stated}
         motors = dict(stated.get("motors", {}))
@@ -148,7 +152,8 @@ class LogLayout:
         is_square = all(len(row) == len(matrix) for row in matrix)
         if matrix and (not is_square or abs(np.linalg.det(np.array(matrix))) < SINGULAR):
             raise LogError(f"[motors]: matrix = {[list(row) for row in matrix]} must be square and have an inverse")
-        return cls(**sources, joints=tuple(joints), torque=channel, gain=gains, rows=rows, motors=matrix)
+        samples = bool(stated.get("samples", False))
+        return cls(**sources, samples=samples, joints=tuple(joints), torque=channel, gain=gains, rows=rows, motors=matrix)
 
     def where(self, quantity: str, source: Source) -> Self:
         """Return the layout with another source of a quantity: t, q, qd or tau."""
@@ -167,6 +172,7 @@ class LogLayout:
     def text(self) -> str:
         """The layout as the text of a file."""
         lines = [f"joints = {json.dumps(list(self.joints), ensure_ascii=False)}"] if self.joints else []
+        lines += ["samples = true  # rows by themselves"] if self.samples else []
         for name in QUANTITIES:
             source: Source = getattr(self, name)
             if name == "q" and not source.columns:
@@ -196,13 +202,15 @@ class Asked:
     layout: LogLayout | None = None
     """A layout in the place of that beside the log."""
     columns: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    """Names of the columns of t, q, qd or tau."""
+    """Names of the columns of t, q, qd, qdd or tau."""
     units: Mapping[str, str] = field(default_factory=dict)
     """Their units."""
     rows: Mapping[str, float] = field(default_factory=dict)
     """Only rows in which these columns have these values."""
     gain: tuple[float, ...] = ()
     """Torque over what is logged."""
+    samples: bool = False
+    """Whether rows are samples by themselves."""
 
     def __post_init__(self) -> None:
         for quantity, unit in self.units.items():
@@ -214,7 +222,8 @@ class Asked:
             layout = layout.where(name, replace(getattr(layout, name), columns=columns))
         for name, unit in self.units.items():
             layout = layout.where(name, replace(getattr(layout, name), unit=unit))
-        return replace(layout, gain=self.gain or layout.gain, rows={**layout.rows, **self.rows})
+        samples = self.samples or layout.samples
+        return replace(layout, gain=self.gain or layout.gain, rows={**layout.rows, **self.rows}, samples=samples)
 
 
 def own_layout(log: Path) -> Path:

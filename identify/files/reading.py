@@ -43,11 +43,12 @@ def standard_layout(path: Path, table: LogTable) -> LogLayout | None:
     if missing or unexpected:
         return None
     qd = tuple(f"qd{end}" for end in ends)
-    velocities = Source(qd) if set(qd) <= set(table.columns) else Source()
+    qdd = tuple(f"qdd{end}" for end in ends)
+    velocities, accelerations = (Source(x) if set(x) <= set(table.columns) else Source() for x in (qd, qdd))
     q, tau = Source(tuple(f"q{end}" for end in ends) if own == "q" else ()), Source(torques)
     warm = tuple(f"temperature{end}" for end in ends)
     every = warm if set(warm) <= set(table.columns) else ("temperature",) if "temperature" in table.columns else ()
-    return LogLayout(Source(("t",)), q, tau, velocities, joints, temperature=Source(every))
+    return LogLayout(Source(("t",)), q, tau, velocities, accelerations, joints=joints, temperature=Source(every))
 
 
 CLOCKS = 1e6  # Times [s] beyond this are those of a calendar: logs count from their beginning
@@ -156,14 +157,17 @@ class LogFiles:
         """What they hold."""
         layout = self.layout
         self._require_once()
-        kinds = [name for name in ("q", "qd", "tau") if name == "tau" or getattr(layout, name).columns]
+        kinds = [name for name in ("q", "qd", "qdd", "tau") if name == "tau" or getattr(layout, name).columns]
         if "q" not in kinds and "qd" not in kinds:
             raise LogError(f"{self.log}: a layout must name columns of q, or of qd, which are then integrated")
         found = {name: self.of(name, getattr(layout, name)) for name in kinds}
         names = layout.joints or next((joints for _, joints in found.values() if joints), ())
         every = {name: self.ordered(name, *of, names) for name, of in found.items()}
-        tau, qd = every["tau"], every.get("qd")
-        if "q" not in every:
+        tau, qd, qdd = every["tau"], every.get("qd"), every.get("qdd")
+        if layout.samples:
+            q, qd, qdd = (every.get(name, np.zeros_like(tau)) for name in ("q", "qd", "qdd"))
+            every["q"] = q
+        elif "q" not in every:
             every["q"], qd = self._integrated(every["qd"]), None
         q = every["q"]
         if q.shape[1] != tau.shape[1]:
@@ -184,7 +188,8 @@ class LogFiles:
         warm = self.of("temperature", layout.temperature)[0] if layout.temperature.columns else None
         gains = tuple(map(float, gain))
         own_times = t_tau - start if other else None
-        return LogColumns(t - start, q, tau, channel, names, qd, own_times, warm, gains, missing, "q" not in kinds)
+        integrated, qdd = "q" not in kinds and not layout.samples, qdd if layout.samples else None
+        return LogColumns(t - start, q, tau, channel, names, qd, qdd, own_times, warm, gains, missing, integrated)
 
     def _integrated(self, qd: Array) -> Array:
         """Return positions of velocities, from 0: q(k+1) = q(k) + (qd(k) + qd(k+1)) (t(k+1) - t(k)) / 2."""
@@ -310,6 +315,8 @@ class LogFiles:
     def times(self, source: Source, count: int) -> Array:
         """Return the times of a quantity [s]."""
         clock = self.layout.t
+        if self.layout.samples:
+            return np.arange(float(count))
         path = self._path(source) if source.t else self._path(clock)
         if not source.t and clock.fs:
             return np.arange(count) / clock.fs

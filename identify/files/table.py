@@ -15,6 +15,7 @@ TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}  # [s]
 POSITIONS = {"rad": 1.0, "deg": np.pi / 180, "mrad": 1e-3, "rev": 2 * np.pi, "m": 1.0, "cm": 1e-2, "mm": 1e-3}
 """Units of positions in rad and m, by name."""
 
+ACCELERATIONS = {f"{unit}/s^2": size for unit, size in POSITIONS.items()}  # [rad/s^2, m/s^2]
 VELOCITIES = {f"{unit}/s": size for unit, size in POSITIONS.items()} | {"rpm": 2 * np.pi / 60}  # [rad/s, m/s]
 TORQUES = {"N m": 1.0, "mN m": 1e-3, "kN m": 1e3, "N cm": 1e-2, "N": 1.0, "kN": 1e3, "A": 1.0, "mA": 1e-3}
 TORQUES |= {"%": 1e-2, "permille": 1e-3, "V": 1.0, "1": 1.0}
@@ -24,6 +25,7 @@ UNITS: Mapping[str, Mapping[str, float]] = {
     "t": TIMES,
     "q": POSITIONS,
     "qd": VELOCITIES,
+    "qdd": ACCELERATIONS,
     "tau": TORQUES,
     "temperature": {"degC": 1.0},
     "command": POSITIONS,

@@ -119,6 +119,9 @@ class Signals:
         qd = expect(self.differentiator, "derivative", self.s(q), q.shape)
         derivative, fs = self.differentiator.derivative, self.fs  # not self.s: a circle of references would outlive long pieces
         conditions = {name: np.swapaxes(x, -1, -2) for name, x in self.log.conditions.items()}
+        if self.log.motion:
+            rates, accelerations = (np.broadcast_to(np.swapaxes(x, -1, -2), q.shape) for x in self.log.motion)
+            return State(q, rates, lambda _: accelerations, conditions)
         if self.log.poses:
             return State(q, np.zeros_like(q), np.zeros_like, conditions)
         return State(q, qd, lambda x: derivative(x, fs), conditions)

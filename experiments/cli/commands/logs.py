@@ -76,7 +76,7 @@ def _understood(options: ShowLog) -> tuple[Understood, LogColumns]:
         write_text(own_layout(options.log), error.start, "--write", force=options.force)
         raise ExperimentError(f"{error}: {own_layout(options.log)} is one to correct") from error
     layout = found.files.layout
-    if not layout.t.columns and not layout.t.fs:
+    if not layout.t.columns and not layout.t.fs and not layout.samples:
         raise ExperimentError(f"{path}: {found.doubts[-1]}")
     raw = needs_gain(layout.tau.unit) and not layout.gain
     return found, replace(found.files, layout=replace(layout, gain=(1.0,)) if raw else layout).columns
@@ -84,7 +84,7 @@ def _understood(options: ShowLog) -> tuple[Understood, LogColumns]:
 
 def _print_layout(page: Page, layout: LogLayout, doubts: Sequence[str]) -> None:
     grid = new_table("", ["unit", "columns"])
-    for name in ("t", "q", "qd", "tau"):
+    for name in ("t", "q", "qd", "qdd", "tau"):
         source: Source = getattr(layout, name)
         if source.columns or source.fs:
             grid.add_row(name, source.unit, ", ".join(source.columns) if source.columns else f"{source.fs:g} Hz")
@@ -112,7 +112,8 @@ def _print_facts(page: Page, facts: LogFacts, unit: str) -> None:
             f"{row['torque_noise']:.2g}",
         )
     t = facts.columns.t
-    print_titled(page, f"{len(t)} rows, {t[-1] - t[0]:.4g} s, {facts.log.fs:.5g} Hz", grid)
+    rate = "" if facts.log.poses else f", {t[-1] - t[0]:.4g} s, {facts.log.fs:.5g} Hz"
+    print_titled(page, f"{len(t)} rows{rate}", grid)
 
 
 def _write(page: Page, options: ShowLog, layout: LogLayout) -> None:
