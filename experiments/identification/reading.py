@@ -95,8 +95,11 @@ def read(path: Path, options: LogRequest, robot_model: RobotModel | None, fallba
     stated = columns.torque or fallback
     channel = channel_of(stated, _meaning(path, options, stated), options.torque_delay)
     poses = columns.qdd is not None or are_poses(path, columns, stated=options.reading.poses)
-    if not np.any(columns.tau) and np.ptp(columns.q, axis=0).any():
-        raise ExperimentError(f"{path}: all torques are 0: there is nothing to identify")
+    if not np.any(columns.tau) and np.ptp(columns.q, axis=0).any() and not (robot_model and robot_model.basis.held):
+        raise ExperimentError(
+            f"{path}: all torques are 0: there is nothing to identify; of joints that nobody drives friction can be, where the "
+            "links are known: --hold links=file"
+        )
     if columns.qdd is None:
         columns = replace(columns, q=_turned(path, columns.q, names, hinges, options.unwrap))
     assumed = options.torque_delay is None and stated is None and not options.reading.simulated

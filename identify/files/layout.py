@@ -34,7 +34,8 @@ class Source:
     unit: str = ""
     """Theirs."""
     file: str = ""
-    """The file that holds them, from where the layout is; by default that of the log."""
+    """The file that holds them, from where the layout is; by default that of the log. A name with a * is that of several, a
+    joint each."""
     t: str = ""
     """Column of that file with its own times, in the unit of t; by default those of the log."""
     fs: float | None = None

@@ -13,7 +13,7 @@ from idbench.identify.files.guess import EPISODES
 from idbench.identify.files.guess_units import FARTHEST, unit_of_times
 from idbench.identify.files.layout import LogLayout, Source, matching
 from idbench.identify.files.lerobot import data_file
-from idbench.identify.files.reading import LogFiles
+from idbench.identify.files.log_files import LogFiles
 from idbench.identify.files.table import LogTable, factor
 
 USUAL: Mapping[str, tuple[str, ...]] = {

@@ -169,6 +169,21 @@ def test_messages_are_read_by_their_fields(kind, tmp_path):
         np.testing.assert_allclose(table.columns["command"], Q + 0.01)
 
 
+def test_a_file_a_joint_without_names_and_times(tmp_path):
+    for j in range(3):
+        np.savetxt(tmp_path / f"joint{j + 1}.txt", np.c_[Q[:, j], QD[:, j], TAU[:, j]])
+    lines = [
+        'file = "joint*.txt"',
+        "[t]",
+        "fs = 100.0",
+        *(f'[{x}]\ncolumns = "{k + 1}"' for k, x in enumerate(("q", "qd", "tau"))),
+    ]
+    (tmp_path / "arm.toml").write_text("\n".join(lines))
+    columns = read_columns(tmp_path / "arm.toml")
+    for values, expected in ((columns.t, T), (columns.q, Q), (columns.qd, QD), (columns.tau, TAU)):
+        np.testing.assert_allclose(values, expected, atol=1e-12)
+
+
 @pytest.mark.parametrize("printed", ["rostopic", "ros2"])
 def test_messages_that_ros_printed_are_read(printed, tmp_path):
     header = "%time,field.header.seq,field.header.stamp,field.header.frame_id"
