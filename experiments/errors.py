@@ -19,7 +19,8 @@ class StudyError(ExperimentError):
 
 
 CONTROL = {code: f"\\x{code:02x}" for code in (*range(32), *range(127, 160)) if chr(code) not in "\n\t"}
-"""Control characters, and what is printed in their place."""
+CONTROL |= {code: f"\\u{code:04x}" for code in (0x200E, 0x200F, *range(0x202A, 0x202F), *range(0x2066, 0x206A))}
+"""Control characters, and those that turn the direction of what follows; what is printed in their place."""
 
 LONGEST = 160  # Characters of a name that are shown
 

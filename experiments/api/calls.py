@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from idbench.experiments.api.logs import given_log
-from idbench.experiments.api.results import Identification, SimulatedRun
+from idbench.experiments.api.results import Identification, SimulatedRun, path_of
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.friction_laws import AUTO
 from idbench.experiments.identification.job import chooses_band, fit_of, identified, request_of, robot_of, truth_of
@@ -80,15 +80,13 @@ def read_log(
     ExperimentError, LogError
         If the file cannot be read, or makes no log.
     """
-    if not isinstance(path, str | Path):
-        raise ExperimentError(f"read_log: {path!r:.60} is no file: give its name")
     robot = load_robot(robot) if isinstance(robot, str | Path) else robot
     table = keys if torque is None else {**keys, "torque": torque}
     taken = _others((Parameters, MountingOptions), but=True) | {"robot", "mask_speed", "cutoff", "estimator"}
     asked = request_from(LogRequest, table, "read_log", taken=taken)
     if sought := delay_method(asked.torque_delay):
         raise ExperimentError(f"torque_delay: the robot is needed for it: idbench.fit(..., torque_delay={sought!r})")
-    file = file_of(Path(path))
+    file = file_of(path_of(path, "read_log"))
     found = read(file, asked, robot)
     if len(found.logs) > 1:
         raise ExperimentError(f"{file} has {len(found.logs)} pieces with gaps between them: give the file itself to the fit")
@@ -176,7 +174,7 @@ def simulate(scenario: str | Path | Scenario, seed: int | None = None, **keys: A
     ExperimentError, BenchError
         If there is no such scenario, or it cannot be simulated.
     """
-    made = scenario if isinstance(scenario, Scenario) else load_scenario(str(scenario))
+    made = scenario if isinstance(scenario, Scenario) else load_scenario(str(path_of(scenario, "simulate")))
     made = made if seed is None else replace(made, seed=seed)
     asked = request_from(LogRequest, named(keys), "simulate", taken=_others((Parameters,)))
     return SimulatedRun(simulated(made), RobotModel(made.robot, asked.parameters))
@@ -234,6 +232,8 @@ def _require_truth(truth: Mapping[str, float] | None, model: RobotModel) -> None
     """Raise ExperimentError if a true parameter is unknown, or one has none."""
     if truth is None:
         return
+    if not isinstance(truth, Mapping):
+        raise ExperimentError(f"truth = {truth!r:.60}: give a mapping of names to values, such as {{'Fs1': 0.5}}")
     names = model.basis.names
     if name := next((name for name in truth if name not in names), None):
         hint = did_you_mean(name, names)

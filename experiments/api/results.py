@@ -34,6 +34,13 @@ from idbench.sim.engine.run import Run
 from idbench.sim.robot.robot import Robot
 
 
+def path_of(path: Any, who: str) -> Path:
+    """Return a path; raise ExperimentError, which begins with `who`, if it is none."""
+    if not isinstance(path, str | Path):
+        raise ExperimentError(f"{who}: {path!r:.60} is no file: give its name")
+    return Path(path)
+
+
 @dataclass(frozen=True)
 class ParameterEstimate:
     """One parameter with its standard error."""
@@ -159,7 +166,10 @@ class Identification:
         ExperimentError
             If a shape is another, the model has no estimate, or intervals are not known.
         """
-        given = [np.asarray(x, dtype=np.float64) for x in (q, qd, qdd)]
+        try:
+            given = [np.asarray(x, dtype=np.float64) for x in (q, qd, qdd)]
+        except (TypeError, ValueError) as error:
+            raise ExperimentError(f"predict: q, qd and qdd are arrays of numbers: {error}") from None
         n = self.fit.basis.n
         if any(x.shape != given[0].shape for x in given) or given[0].shape[-1:] != (n,):
             shapes = ", ".join(str(x.shape) for x in given)
@@ -218,7 +228,7 @@ class Identification:
             If the file lacks something that was identified.
         """
         read = (Robot.path(self.robot.name),)  # never written over
-        for path in map(Path, paths):
+        for path in (path_of(path, "write") for path in paths):
             if path.suffix not in EXPORTS:
                 raise ExperimentError(f"{path}: its name must end with {', '.join(EXPORTS)}")
             EXPORTS[path.suffix].require_free(path, "write", force=force, read=read)
@@ -245,9 +255,10 @@ class Identification:
         """
         from idbench.experiments.reports.page import report
 
+        path = path_of(path, "report")
         with Attempts("the fit is kept") as attempts:
             text = report(self.judgement, self.answer, self.doubts, self.fit.logs.notes, "idbench.fit(...)", attempts)
-            write_text(Path(path), text, "report", force=force)
+            write_text(path, text, "report", force=force)
 
     def summary(self) -> dict[str, Any]:
         """The summary.json of `idbench identify`, but for the names of files."""

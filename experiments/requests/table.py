@@ -39,8 +39,16 @@ def request_from(
 
 
 def _checked(where: str, hint: Any, value: Any) -> Any:
-    """Return a value as the type of its field has it: one for several, and a number for a text that may be one, are taken."""
+    """Return a value as the type of its field has it.
+
+    One is taken for several, a number for a text that may be one, and a table for texts NAME=VALUE.
+    """
     plain = str(plain_of(hint))
+    if "tuple" in plain and isinstance(value, Mapping):
+        each = {name: x if isinstance(x, list | tuple) else [x] for name, x in value.items()}
+        value = tuple(f"{name}={','.join(map(str, x))}" for name, x in each.items())
+    if plain_of(hint) is bool and not isinstance(value, bool):
+        raise ExperimentError(f"{where} = {value!r:.60}: must be true or false")
     if "tuple" in plain and isinstance(value, str | int | float | Path) and not isinstance(value, bool):
         value = (value,)
     if plain_of(hint) in (str, str | None) and isinstance(value, int | float | Path) and not isinstance(value, bool):

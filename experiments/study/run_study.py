@@ -33,6 +33,7 @@ def _same(here: Mapping[str, Any], there: Mapping[str, Any], name: str) -> bool:
 
 Part = TypeVar("Part")
 
+FIRST, KEPT = 8, 10.0  # Runs of the first shards at most, and seconds that the others take
 POLL = 0.2  # How often [s] the progress is shown while shards are computed
 
 
@@ -91,10 +92,13 @@ def run_missing(
 ) -> None:
     """Run what a study lacks, in shards of at most `shard` runs; what is finished when this is interrupted is kept.
 
+    Shards begin small, and are as long as some `KEPT` seconds take, so that an interruption loses no more.
+
     `watch` receives how many runs of this call are done, parts of shards included; `finished_shard` the runs of every shard
     when it is kept.
     """
-    todo = store.missing(shard)
+    size = min(shard, FIRST)
+    todo = store.missing(lambda: size)
     pending = dict[Future[Shard], range]()
     done = 0
     while True:
@@ -105,7 +109,8 @@ def run_missing(
         finished, _ = wait(pending, timeout=POLL, return_when=FIRST_COMPLETED)
         for future in sorted(finished, key=lambda future: future.exception() is not None):  # what is good is kept first
             runs = pending.pop(future)
-            store.write(runs, future.result())
+            store.write(runs, made := future.result())
+            size = min(shard, max(1, int(KEPT * len(runs) / max(sum(made.seconds.values()), 1e-3))))
             done += len(runs)
             if finished_shard:
                 finished_shard(runs)

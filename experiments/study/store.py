@@ -3,7 +3,7 @@
 import json
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import pairwise
@@ -167,12 +167,13 @@ class Store:
         """Return the files of the finished shards, in the order of their runs."""
         return sorted((self.folder / "shards").glob("runs-*.parquet"))
 
-    def missing(self, shard: int) -> Iterator[range]:
+    def missing(self, shard: int | Callable[[], int]) -> Iterator[range]:
         """Yield the runs that no finished shard holds, at most `shard` at a time and all of one point of the grid."""
+        most = shard if callable(shard) else lambda: shard
         next_run, size = 0, self.study.size
         for done in [*map(runs_of, self.shards()), range(size, size)]:
             while next_run < done.start:
-                end = min(done.start, next_run + shard, (next_run // self.study.seeds + 1) * self.study.seeds)
+                end = min(done.start, next_run + most(), (next_run // self.study.seeds + 1) * self.study.seeds)
                 yield range(next_run, end)
                 next_run = end
             next_run = max(next_run, done.stop)

@@ -140,18 +140,22 @@ def _table_begins(lines: Sequence[bytes], first: int) -> int:
     `first` where lines before have as many cells as those after, or none are numbers.
     """
 
+    def cells_of(k: int, mark: bytes) -> list[str]:
+        return _cells(lines[k].decode("utf-8", errors="replace").encode(), mark) if k < len(lines) and lines[k].strip() else []
+
     def size(k: int, mark: bytes) -> int:
-        return len(_cells(lines[k], mark)) if k < len(lines) and lines[k].strip() else 0
+        return len(cells_of(k, mark))
 
     def numbers(k: int, mark: bytes) -> bool:
-        cells = [cell for cell in _cells(lines[k], mark) if cell]
+        cells = [cell for cell in cells_of(k, mark) if cell]
         return bool(cells) and all(re.fullmatch(NUMBER, cell, re.IGNORECASE) for cell in cells)
 
     for mark in (b"\t", b";", b","):
         for k in range(first, min(len(lines), MOST_BEFORE) - 2):
             n = size(k, mark)
             if n > 1 and n == size(k + 1, mark) == size(k + 2, mark) and numbers(k + 1, mark) and numbers(k + 2, mark):
-                return k
+                units = k > first and n == size(k - 1, mark) and not numbers(k, mark)  # below the names
+                return k - units
     return first
 
 

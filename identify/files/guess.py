@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from idbench.identify.errors import LogError
-from idbench.identify.files.guess_units import with_units
+from idbench.identify.files.guess_units import FEWEST, with_units
 from idbench.identify.files.layout import UNLOGGED, Asked, LogLayout, Source
 from idbench.identify.files.table import LogTable
 
@@ -30,7 +30,6 @@ EPISODES = ("episode_index", "episode", "run", "trial")  # Columns that distingu
 MOST_BLOCKS = (3, 4, 5, 6, 7, 8)
 """Quantities of each joint that a file without names may have: positions, velocities, accelerations, torques, set points."""
 
-FEWEST = 10  # Rows that a guess takes
 ALIKE = 0.2  # Departure of a column from the derivative of another, as a share, up to which it is its velocity
 
 
@@ -62,8 +61,8 @@ def guess(path: Path, table: LogTable, asked: Asked = Asked()) -> tuple[LogLayou
         If nothing in it looks like positions and torques.
     """
     told = {"q", "tau"} <= set(asked.columns)
-    if table.rows < FEWEST and not told:
-        raise LogError(f"{path} has {table.rows} rows: too few to say what its columns are")
+    if table.rows < FEWEST and not told and not table.named:
+        raise LogError(f"{path}: {_nameless(table)}")
     found = _by_names(table) if table.named else LogLayout() if told else _by_values(path, table)
     found = asked.over(replace(found, joints=() if "q" in asked.columns else found.joints))
     missing = [name for name in ("q", "tau") if not getattr(found, name).columns]
@@ -111,6 +110,8 @@ def _alike(table: LogTable, found: LogLayout, asked: Asked) -> list[str]:
     q, tau = ([place.get(name, "") for name in source.names(every)] for source in (motion, found.tau))
     if free and n == torques == len(q) == len(tau) and set(q) != set(tau):  # columns of several entries have no places
         doubts.append(f"positions are of {', '.join(q)}, torques of {', '.join(tau)}: are these the same joints?")
+    if free and all(place.isdigit() for place in q) and q and len(q) <= max(map(int, q)) - min(map(int, q)):
+        doubts.append(f"positions are numbered {', '.join(q)}: are some missing?")
     rest = [name for (of, _), names in groups.items() for name, _ in names if of == "tau" and name not in found.tau.columns]
     if UNLOGGED in found.tau.columns and rest:
         doubts.append(f"some joints have no column of torques like {found.tau.logged[0]}: are they {', '.join(rest)}?")

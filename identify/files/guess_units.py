@@ -9,6 +9,7 @@ from idbench.identify.arrays import Array
 from idbench.identify.files.layout import Asked, LogLayout, Source
 from idbench.identify.files.table import SI, LogTable, factor, named_unit, needs_gain, read_unit
 
+FEWEST = 10  # Rows that a guess by values takes
 CURRENTS = ("current", "currents", "cur", "amps")
 
 SAY_UNIT = "say its unit, --units q=deg, mrad, rev, or count:COUNTS_OF_A_TURN@COUNT_AT_ZERO"
@@ -26,7 +27,7 @@ def with_units(layout: LogLayout, table: LogTable, asked: Asked) -> tuple[LogLay
         if not names or name in asked.units:
             continue
         stated = named_unit(name, names[0])
-        unit = stated or _suspected(name, layout, table)
+        unit = stated or (_suspected(name, layout, table) if table.rows >= FEWEST else "")
         if name == "q" and not stated and (most := _largest(table, source)) > MOST_DEGREES:
             doubts.append(f"q reaches {most:.5g}: {SAY_UNIT}")
         elif unit and not stated and unit not in (SI[name], "A"):  # currents are asked for their gain

@@ -30,6 +30,8 @@ def write_log(log: MotionLog, path: Path | str, joints: Sequence[str] = ()) -> N
     OSError
         If the file cannot be written.
     """
+    if not isinstance(log, MotionLog):
+        raise LogError(f"write_log: {log!r:.60} is no MotionLog, such as read_log returns")
     path = Path(path)
     if path.suffix.lower() not in WRITTEN:
         raise LogError(f"{path}: the name of a log that is written must end with {' or '.join(WRITTEN)}")

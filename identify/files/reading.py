@@ -7,7 +7,7 @@ from pathlib import Path
 from idbench.identify.data.log_columns import LogColumns
 from idbench.identify.errors import LogError
 from idbench.identify.files.formats import read_table
-from idbench.identify.files.guess import FEWEST, guess, kind_of
+from idbench.identify.files.guess import guess, kind_of
 from idbench.identify.files.guess_units import with_units
 from idbench.identify.files.layout import LAYOUT, UNLOGGED, Asked, LogLayout, Source, own_layout
 from idbench.identify.files.log_files import LogFiles
@@ -107,7 +107,7 @@ def understood(path: Path, asked: Asked = Asked(), *, anew: bool = False) -> Und
     table = tables[path]
     if standard := standard_layout(path, table):
         layout = asked.over(standard)
-        looks = with_units(layout, table, asked)[1] if table.rows >= FEWEST and not table.words else []
+        looks = with_units(layout, table, asked)[1] if not table.words else []
         return Understood(LogFiles(path, path.parent, layout, tables), tuple(looks))
     layout, doubts = guess(path, table, asked)
     sources = ((name, getattr(layout, name)) for name in ("t", "q", "qd", "tau"))

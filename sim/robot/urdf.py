@@ -129,6 +129,10 @@ def _mend(root: ElementTree.Element) -> Iterator[str]:
     missing, impossible = list[str](), list[str]()
     for name, link in links.items():
         inertial = link.find("inertial")
+        if inertial is not None and _mass(inertial) < 0:
+            raise RobotError(
+                f"link {name} has a mass of {_mass(inertial):g} kg: a mass is above 0, or leave its <inertial> out"
+            )
         if inertial is not None and _mass(inertial) <= 0:
             link.remove(inertial)
             inertial = None

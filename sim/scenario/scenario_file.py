@@ -46,7 +46,7 @@ def designed() -> tuple[str, ...]:
     return tuple(sorted(path.relative_to(FOLDER).with_suffix("").as_posix() for path in FOLDER.glob("*/*.toml")))
 
 
-def load(name: str) -> Scenario:
+def load(name: str | Path) -> Scenario:
     """Return the scenario that ships as `name`, or that of a TOML file.
 
     Raises
@@ -60,7 +60,9 @@ def load(name: str) -> Scenario:
     >>> load_scenario("quantization").encoder.lines
     (4096,)
     """
-    content = _content(name)
+    if not isinstance(name, str | Path):
+        raise ScenarioError(f"{name!r:.60} is no scenario: give its name, or its file")
+    content = _content(str(name))
     try:
         return from_dict(content)
     except ScenarioError as error:

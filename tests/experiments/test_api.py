@@ -234,6 +234,33 @@ def test_an_object_has_the_name_of_the_table_where_it_is_one():
 
 
 @pytest.mark.thorough
+@pytest.mark.parametrize(
+    ("call", "complaint"),
+    [
+        (lambda log, found: idbench.fit(log, truth=3), "give a mapping"),
+        (lambda log, found: found.predict("a", "b", "c"), "arrays of numbers"),
+        (lambda log, found: found.write(None), "give its name"),
+        (lambda log, found: found.report(None), "give its name"),
+        (lambda log, found: idbench.write_log(None, "a.csv"), "is no MotionLog"),
+        (lambda log, found: idbench.load_scenario(3), "is no scenario"),
+        (lambda log, found: idbench.simulate(3), "give its name"),
+        (lambda log, found: idbench.fit(log, no_trials="yes"), "must be true or false"),
+    ],
+)
+def test_wrong_types_are_told_in_one_line(files, call, complaint):
+    log = idbench.read_log(files / "first.parquet")
+    with pytest.raises(ValueError, match=complaint) as found:
+        call(log, idbench.fit(log, model="explicit", estimator="OLS"))
+    assert "\n" not in str(found.value)
+
+
+def test_tables_are_taken_where_the_command_line_has_pairs(files):
+    held = idbench.load_robot("scara", hold={"Fs1": 0.25}).basis.held
+    assert [float(np.asarray(x)) for x in held.values()] == [0.25]
+    degrees = idbench.read_log(files / "first.parquet", units={"q": "deg"}).q
+    np.testing.assert_allclose(degrees, np.pi / 180 * idbench.read_log(files / "first.parquet").q)
+
+
 def test_it_lives_beside_folders_of_the_same_names(tmp_path):
     """A script whose project has packages of its own called models, sim, identify and experiments."""
     for name in ("models", "sim", "identify", "experiments"):

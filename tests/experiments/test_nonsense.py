@@ -69,14 +69,15 @@ def test_an_estimator_that_fails_is_not_a_short_log(monkeypatch, complaint, logs
 
 
 def test_control_characters_do_not_reach_the_terminal(tmp_path, capfd):
-    """A name that would turn the screen red, and begin a line of its own."""
-    text = DH.format(gravity="", first="").replace('name = "a"', 'name = "a\\u001b[31mRED\\u009b"')
+    """A name that would turn the screen red, or what follows around, and begin a line of its own."""
+    text = DH.format(gravity="", first="").replace('name = "a"', 'name = "a\\u001b[31mRED\\u009b\\u202e"')
     (tmp_path / "arm.toml").write_text(text)
     main(["robot", str(tmp_path / "arm.toml")])
     main(["robot", str(tmp_path / "no\x1b[31m\nsuch.toml")])
     out, err = capfd.readouterr()
     assert "\x1b" not in out + err
     assert "\x9b" not in out + err
+    assert "\u202e" not in out + err
     assert len(err.splitlines()) <= 1 + out.count("\x00")
 
 

@@ -196,7 +196,7 @@ def test_rows_that_continue_each_other_are_no_poses_unless_that_is_stated(csv, t
 @pytest.mark.parametrize(
     ("more", "said"),
     [
-        (("--torque-delay", "estimate"), "poses at rest show no delay"),
+        (("--torque-delay", "estimate"), "show no delay"),
         (("--cutoff", "3"), "no band"),
         (("--chain", "paper"), "no band"),
         (("--estimator", "ML"), "poses at rest hold no motion"),

@@ -17,6 +17,12 @@ from idbench.sim.robot.robot import Robot
 
 def device(options: ShowDevice) -> None:
     """List devices, or print one, and write its files."""
+    if not 0 < options.kp < float("inf"):
+        raise ExperimentError(f"--kp {options.kp:g} must be a finite number above 0")
+    robot = absolute(options.robot or BENCH)
+    names = Robot.load(robot).joints if options.robot or options.joints or options.write_mjcf else ()
+    if wrong := [joint for joint in options.joints if joint not in names]:
+        raise ExperimentError(f"--joints {wrong[0]}: {robot} has no such joint; it has {', '.join(names)}")
     page = Page(machine=options.json)
     for option, path, ending in (("--write-mjcf", options.write_mjcf, ".xml"), ("--write", options.write, ".toml")):
         if path is not None:
@@ -29,13 +35,7 @@ def device(options: ShowDevice) -> None:
         return
     page.found |= device_of(options.name)
     _print(page, options.name)
-    if options.robot:
-        Robot.load(absolute(options.robot))  # before anything is written
     if options.write_mjcf is not None:
-        robot = absolute(options.robot or BENCH)
-        names = Robot.load(robot).joints
-        if wrong := [joint for joint in options.joints if joint not in names]:
-            raise ExperimentError(f"--joints {wrong[0]}: {robot} has no such joint; it has {', '.join(names)}")
         places = [names.index(joint) for joint in options.joints or names]
         text = mjcf_of_device(device_of(options.name), robot, places, options.kp, options.write_mjcf.absolute().parent)
         write_text(options.write_mjcf, text, "--write-mjcf", force=options.force)

@@ -30,7 +30,7 @@ def test_scalars_of_others_are_a_log_whose_joints_have_names(tmp_path):
 
 
 def test_a_recording_of_ours_is_the_log_that_it_shows(recorded):
-    columns, log = read_columns(recorded.folder / "recording.rrd"), recorded.ran.series.log
+    columns, log = read_columns(recorded.folder / "recording.rrd"), recorded.ran.run.alone()
     shown = np.searchsorted(log.t, columns.t - 1e-9)
     np.testing.assert_allclose(columns.q, log.q[shown], atol=1e-12)
     assert columns.tau.shape == columns.q.shape
