@@ -91,7 +91,8 @@ def _elementwise(operation: str, *of: Any) -> SymbolArray:
         each: list[Any] = [x[place] for x in arrays]
         tape = next((x.tape for x in each if isinstance(x, Symbol)), None)
         numbers = [x if isinstance(x, Symbol) else float(x) for x in each]
-        found[place] = float(NUMBERS[operation](*numbers)) if tape is None else tape.apply(operation, *numbers)
+        with np.errstate(all="ignore"):  # where nothing is known, constants are NaN
+            found[place] = float(NUMBERS[operation](*numbers)) if tape is None else tape.apply(operation, *numbers)
     return SymbolArray(found)
 
 
