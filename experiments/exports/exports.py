@@ -68,7 +68,7 @@ def mjcf(fit: Fit, model: str, path: Path) -> Exported:
 
 def urdf(fit: Fit, model: str, path: Path) -> Exported:
     """The robot as URDF with the parameters, and what readers of it do not have."""
-    from idbench.sim.robot.write_urdf import urdf_text
+    from idbench.sim.robot.written_xml import urdf_text
 
     written, robot_model = WrittenRobot(fit, model), fit.robot_model
     text = urdf_text(robot_model.name, robot_model.robot, robot_model.tree, written.values, robot_model.mounting)
@@ -80,7 +80,7 @@ def urdf(fit: Fit, model: str, path: Path) -> Exported:
 
 def sdf(fit: Fit, model: str, path: Path) -> Exported:
     """The robot as SDF with the parameters, and what readers of it do not have."""
-    from idbench.sim.robot.write_sdf import sdf_text
+    from idbench.sim.robot.written_xml import sdf_text
 
     written, robot_model = WrittenRobot(fit, model), fit.robot_model
     text = sdf_text(robot_model.robot, robot_model.tree, written.values)

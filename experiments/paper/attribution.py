@@ -8,7 +8,7 @@ the power model alone; a gain error scales everything.
 from dataclasses import dataclass, replace
 from typing import TypeAlias
 
-from idbench.experiments.study.run_study import LocalPool
+from idbench.experiments.study.job import LocalPool
 from idbench.identify import (
     Array,
     AsLogged,

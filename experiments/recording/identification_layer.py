@@ -8,12 +8,11 @@ import rerun as rr
 from idbench.experiments.identification.fit import Fit
 from idbench.experiments.recording.audience import Audience
 from idbench.experiments.recording.chart import send_keys
-from idbench.experiments.recording.columns import part, parts, seconds, shown, time_columns
 from idbench.experiments.recording.folder import layer_file
 from idbench.experiments.recording.lanes import Lanes, estimates_table, mask_states, noise_table, short_table
 from idbench.experiments.recording.layouts import tabs
 from idbench.experiments.recording.residual_charts import ResidualCharts, send_iterations, send_parameters
-from idbench.experiments.recording.stream import Stream
+from idbench.experiments.recording.stream import Stream, part, parts, seconds, shown, time_columns
 from idbench.experiments.text import FORM_WIDTHS, GREY, JOINTS, UNITS, Color, joint_colors, kind_colors, model_color
 from idbench.identify import Array, Estimate, JointFit, filtered, measured_state, recursive_least_squares, smoothed_motion
 

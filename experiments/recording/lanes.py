@@ -9,8 +9,7 @@ import numpy.typing as npt
 import rerun as rr
 
 from idbench.experiments.identification.fit import Fit
-from idbench.experiments.recording.columns import time_columns
-from idbench.experiments.recording.stream import Stream
+from idbench.experiments.recording.stream import Stream, time_columns
 from idbench.experiments.reports.estimates import LEAST, EstimatesTable, models_apart
 from idbench.experiments.text import MEASURED, PLANNED, STATES, Color, markdown
 from idbench.identify import Array

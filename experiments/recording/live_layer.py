@@ -13,9 +13,8 @@ from idbench.experiments.identification.logs import Logs
 from idbench.experiments.identification.method import Method
 from idbench.experiments.identification.request import Request
 from idbench.experiments.identification.robot_model import RobotModel
-from idbench.experiments.recording.columns import part, seconds
 from idbench.experiments.recording.identification_layer import row_names, send_rows
-from idbench.experiments.recording.stream import Stream
+from idbench.experiments.recording.stream import Stream, part, seconds
 from idbench.experiments.text import FORM_WIDTHS, FORMS, GREY
 from idbench.identify import Array, Estimate, IdentificationError, MotionLog, TorqueChannel
 from idbench.identify.rows.rows import is_long
