@@ -106,7 +106,7 @@ def identifiers(names: Sequence[str]) -> list[str]:
 
 def template(name: str) -> Template:
     """What a written file says of every robot, with $words in the places of what varies."""
-    return Template(files("idbench.experiments.exports").joinpath("templates", f"{name}.template").read_text(encoding="utf-8"))
+    return Template(files("idbench.experiments.exports").joinpath(f"{name}.txt").read_text(encoding="utf-8"))
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,7 +20,7 @@ from idbench.sim.robot.robot import Robot
 from idbench.sim.robot.scene import Mover, SceneShape, shapes
 
 if TYPE_CHECKING:
-    from idbench.experiments.recording.live_layer import LiveIdentification
+    from idbench.experiments.recording.identification_layer import LiveIdentification
 
 
 class Arm:
