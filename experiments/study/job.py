@@ -132,8 +132,17 @@ def store_of(asked: StudyRequest, out: Path | None = None, *, many: bool = False
         if value is not None and value < 1:
             raise StudyError(f"--{name} {value} must be at least 1")
     if asked.resume is not None:
-        return _resumed(asked.resume, asked.study, out, asked.seeds)
-    return _begun(str(asked.study), out, asked.seeds, many)
+        given = [f"--{what}" for what, value in (("out", out), ("seeds", asked.seeds)) if value is not None]
+        if asked.study is not None or given:
+            others = ", ".join(filter(None, [asked.study, *given]))
+            raise StudyError(f"--resume {asked.resume} goes on with the study of that folder: leave out {others}")
+        return Store.open(asked.resume)
+    described = load_study(str(asked.study))
+    described = described if asked.seeds is None else replace(described, seeds=asked.seeds)
+    if described.size > MANY and not many:
+        raise StudyError(f"{asked.study} has {described.size:,} runs, more than {MANY:,}: if you mean it, add --yes")
+    _ = described.points  # every combination is looked at before the first is run
+    return Store.new(described, out or Path("runs") / described.name)
 
 
 def width_of(asked: StudyRequest) -> int:
@@ -158,20 +167,3 @@ def worker_pool(asked: StudyRequest, store: Store) -> AbstractContextManager[Any
     if asked.scheduler or asked.workers:
         return cluster_pool(store.study, asked.scheduler, width_of(asked))
     return local_pool(store.study, width_of(asked))
-
-
-def _begun(name: str, out: Path | None, seeds: int | None, many: bool) -> Store:
-    described = load_study(name) if seeds is None else replace(load_study(name), seeds=seeds)
-    if described.size > MANY and not many:
-        raise StudyError(f"{name} has {described.size:,} runs, more than {MANY:,}: if you mean it, add --yes")
-    _ = described.points  # every combination is looked at before the first is run
-    return Store.new(described, out or Path("runs") / described.name)
-
-
-def _resumed(folder: Path, name: str | None, out: Path | None, seeds: int | None) -> Store:
-    given = [f"--{what}" for what, value in (("out", out), ("seeds", seeds)) if value is not None]
-    if name is not None or given:
-        raise StudyError(
-            f"--resume {folder} goes on with the study of that folder: leave out {', '.join(filter(None, [name, *given]))}"
-        )
-    return Store.open(folder)
