@@ -16,7 +16,7 @@ from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.recording.audience import Audience
 from idbench.experiments.recording.chart import send_keys
 from idbench.experiments.recording.folder import layer_file
-from idbench.experiments.recording.lanes import Lanes, estimates_table, mask_states, noise_table, short_table
+from idbench.experiments.recording.lanes import Lanes, estimates_table, noise_table, short_table
 from idbench.experiments.recording.layouts import tabs
 from idbench.experiments.recording.residual_charts import ResidualCharts, send_iterations, send_parameters
 from idbench.experiments.recording.stream import Stream, part, parts, seconds, shown, time_columns
@@ -101,7 +101,8 @@ class Layer:
                 self.stream.curves(path, time_columns(samples[kept] / log.fs, log.fs), curves.T[kept])
         lanes, weight = Lanes(self.stream, log.fs), self._signals.weight
         for joint, of_joint in zip(self._joints, weight, strict=True):
-            lanes.send(f"{self._at}/mask/{joint}", log.t, mask_states(of_joint))
+            used = np.where(of_joint == 0, "masked", np.where(of_joint < 1, "partly", "used"))
+            lanes.send(f"{self._at}/mask/{joint}", log.t, used)
 
     def _smoothed(self, fit: JointFit) -> None:
         """Send the smoothed motion with its band of one sigma, and how far measured positions and their differences are off."""

@@ -100,8 +100,3 @@ def joint_states(qd: Array, slow: float, limited: Array | None, before: float) -
     reverses = np.concatenate([[before], qd[:-1]]) * qd < 0  # a fast joint reverses between two samples
     states = np.where(speed <= STILL * slow, "rests", np.where(reverses | (speed <= slow), "reverses", "moves"))
     return states if limited is None else np.where(limited > 0, "saturated", states)
-
-
-def mask_states(weight: Array) -> npt.NDArray[np.str_]:
-    """True where an instant is used, from its weight, shape (time,)."""
-    return np.where(weight == 0, "masked", np.where(weight < 1, "partly", "used"))
