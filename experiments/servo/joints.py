@@ -166,7 +166,8 @@ class Joints:
         change = np.inf
         for _ in range(SWEEPS):
             moving = self._moving(fits, runs)
-            apart = _apart(before, moving) if before else change
+            each = zip(before, moving, strict=True) if before else ()  # largest mean difference over joints and logs [rad]
+            apart = max((float(np.abs(a[j].q - b[j].q).mean()) for a, b in each for j in a), default=change)
             if apart > change:  # joints that saturate may push each other apart
                 break
             runs = self._loaded(moving)
@@ -269,11 +270,6 @@ class Joints:
         measured = columns.t, columns.q[:, j], columns.command[:, j]
         enabled = None if on is None else on > 0.5
         return ServoRun(*measured, load, log.servos[j], enabled, voltage, forward, (low, high), name=name)
-
-
-def _apart(one: Sequence[Mapping[int, Moving]], other: Sequence[Mapping[int, Moving]]) -> float:
-    """Largest mean difference of motions over joints and logs [rad]."""
-    return max(float(np.abs(a[j].q - b[j].q).mean()) for a, b in zip(one, other, strict=True) for j in a)
 
 
 def _attempt(identify: Callable[[], Identified]) -> tuple[Identified | str, ServoFit | None]:
