@@ -20,7 +20,7 @@ from idbench.identify.plugins import did_you_mean
 from idbench.sim.errors import BenchError, RobotError
 from idbench.sim.robot.dh import TABLE, from_table
 from idbench.sim.robot.motors import Array, Motors
-from idbench.sim.robot.opened import drop_ties, hold_bases
+from idbench.sim.robot.mounting import drop_ties, hold_bases
 from idbench.sim.robot.payload import without_missing_meshes
 from idbench.sim.robot.urdf import SMALL, from_urdf
 
