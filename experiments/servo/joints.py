@@ -11,11 +11,10 @@ from idbench.identify import Array, IdentificationError
 from idbench.identify.files.servo_log import ServoColumns
 from idbench.identify.servo import JointLoad, Servo, ServoFit, ServoRun, identify_again
 from idbench.identify.servo.choice import ServoFrictionChoice
-from idbench.identify.servo.identification import APART, OffsetJoint, per_offset, together
+from idbench.identify.servo.identification import APART, OffsetJoint, per_offset, tied, together
 from idbench.identify.servo.rows import corrected, smoothed
 from idbench.identify.servo.run import without_spikes
 from idbench.identify.servo.stages import searched_runs
-from idbench.identify.servo.tied import tied
 from idbench.identify.telling import stage
 from idbench.sim.robot.inverse_dynamics import inverse_dynamics, mass_matrices
 from idbench.sim.robot.robot import Robot
