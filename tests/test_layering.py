@@ -47,7 +47,6 @@ ALLOWED_IN = {
     "experiments/study/job.py": {"threadpoolctl"},
     "experiments/study/cluster.py": {"dask", "distributed", "threadpoolctl"},
     "experiments/study/statistics.py": {"scipy"},
-    "experiments/study/comparison.py": {"scipy"},
     "experiments/reports/log_picture.py": {"matplotlib", "scipy"},
     "experiments/study/figures.py": {"matplotlib"},
     "experiments/paper/motions.py": {"matplotlib"},

@@ -12,8 +12,7 @@ import numpy as np
 
 from idbench.experiments.program import program
 from idbench.experiments.study.axis import FRICTION
-from idbench.experiments.study.comparison import SURE, differences
-from idbench.experiments.study.statistics import Cell
+from idbench.experiments.study.statistics import SURE, Cell, differences
 from idbench.experiments.study.study import Study
 
 LEVELS = (0.1, 0.01, 0.001, 0.0001)  # Typical errors that are asked for

@@ -29,7 +29,6 @@ from idbench.experiments.study.answer import (
 )
 from idbench.experiments.study.axis import FRICTION
 from idbench.experiments.study.cluster import versions
-from idbench.experiments.study.comparison import differences
 from idbench.experiments.study.figures import (
     bars_figure,
     cost_figure,
@@ -39,7 +38,7 @@ from idbench.experiments.study.figures import (
     typical_figure,
 )
 from idbench.experiments.study.ratios import compares_models, interval, pair_of, ratios, ratios_table, study_answer
-from idbench.experiments.study.statistics import BOUNDS, NAMED, Cell, cells
+from idbench.experiments.study.statistics import BOUNDS, NAMED, Cell, cells, differences
 from idbench.experiments.study.store import Store, arrays
 from idbench.experiments.study.study import Study
 from idbench.experiments.text import new_table, print_table

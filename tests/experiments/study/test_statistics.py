@@ -8,8 +8,7 @@ import pytest
 from scipy import stats
 
 from idbench.experiments.study.answer import WORST, answer, requirements, worst_runs
-from idbench.experiments.study.comparison import SURE, differences
-from idbench.experiments.study.statistics import Cell, cells
+from idbench.experiments.study.statistics import SURE, Cell, cells, differences
 
 TRUTH = np.array([2.0, -0.5])
 
