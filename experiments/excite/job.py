@@ -119,7 +119,10 @@ def excited(asked: ExciteRequest, progress: Callable[[float], None]) -> tuple[Ex
     design = designed(asked)
     if asked.until is None:
         return Excited.of(design, progress), None
-    sequence = MotionSequence.of(design, _percent(asked.until), progress)
+    share = (number_of(asked.until.removesuffix("%")) or 0.0) / 100
+    if not 0 < share < 1:
+        raise ExperimentError(f"--until {asked.until}: give a share between 0 and 100 %, such as 0.1%")
+    sequence = MotionSequence.of(design, share, progress)
     return sequence.rounds[-1].excited, sequence
 
 
@@ -209,14 +212,6 @@ def _weights(given: tuple[str, ...]) -> Mapping[str, float]:
         if not 1e-6 <= found[name] <= 1e6:
             raise ExperimentError(f"--weigh {text}: give a parameter and a weight from 1e-6 to 1e6, such as LMY2=4")
     return found
-
-
-def _percent(text: str) -> float:
-    """Return a share given in percent."""
-    share = (number_of(text.removesuffix("%")) or 0.0) / 100
-    if not 0 < share < 1:
-        raise ExperimentError(f"--until {text}: give a share between 0 and 100 %, such as 0.1%")
-    return share
 
 
 PARTS = "part: 0 the way from home to the start, 1 the motion, with its rest at both ends, 2 the way back"

@@ -24,18 +24,16 @@ from idbench.sim.robot.servos import Commands, ServoValues, replay, with_servos
 def servo_function(robot: str, fits: Mapping[str, tuple[Servo, ServoFit]], logs: Sequence[str]) -> str:
     """Python file of what is known of each joint's servo, and what was found."""
     text = files("idbench.experiments.exports").joinpath("servo.py.txt").read_text(encoding="utf-8")
-    every = {joint: _parameters(servo, fit) for joint, (servo, fit) in fits.items()}
+    every = dict[str, dict[str, float]]()
+    for joint, (servo, fit) in fits.items():
+        known = {name: getattr(servo, name) for name in ("kd", "supply", "limit", "counts", "speed_limit")}
+        law = {name: float(x) for name, x in ServoLaw(**fit.p)._asdict().items()}
+        every[joint] = {"gain": servo.slope, **known, **{name: law[name] for name in SERVO_PARAMETERS if name != "backlash"}}
     table = pformat(every, width=110, sort_dicts=False).replace("inf", 'float("inf")')
     words = {"name": robot, "version": version("idbench"), "logs": ", ".join(logs)}
     for mark, word in {**words, "servos": table}.items():
         text = text.replace(f"{{{mark}}}", word)
     return text
-
-
-def _parameters(servo: Servo, fit: ServoFit) -> dict[str, float]:
-    known = {name: getattr(servo, name) for name in ("kd", "supply", "limit", "counts", "speed_limit")}
-    law = ServoLaw(**fit.p)._asdict()
-    return {"gain": servo.slope, **known, **{name: float(law[name]) for name in SERVO_PARAMETERS if name != "backlash"}}
 
 
 EXPRESSIBLE = ("a", "b", "Ia", "Fs", "Fv", "offset", "lag", "lead", "delay", "rate", "backlash")
