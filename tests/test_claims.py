@@ -24,10 +24,10 @@ from idbench.experiments.loads import known_load
 from idbench.experiments.paper import table2
 from idbench.experiments.paper.motions import Table1Motions
 from idbench.experiments.paper.table1 import PAPER
-from idbench.experiments.recording import columns
-from idbench.experiments.recording.viewers import LOOPBACK
-from idbench.experiments.reports import uncertainty
-from idbench.experiments.servo.device import device_of
+from idbench.experiments.recording import stream
+from idbench.experiments.recording.audience import LOOPBACK
+from idbench.experiments.reports import estimates
+from idbench.experiments.servo.servo_files import device_of
 from idbench.experiments.study import statistics
 from idbench.experiments.study.study_file import load_study
 from idbench.identify import CHAINS, ESTIMATORS
@@ -40,7 +40,6 @@ from idbench.identify.judge import (
     delay,
     friction_choice,
     held_out,
-    mask_choice,
     small_mistakes,
     torque_interval,
     used_rows,
@@ -207,13 +206,13 @@ CLAIMS: list[tuple[str, str, Callable[[], object]]] = [
     ("identification.md", r"(\w+) chains ship", lambda: len(CHAINS.builtin)),
     ("identification.md", r"\*\*Its threshold\*\* is (\d+) % of each joint's rms speed", lambda: 100 * masks.SLOW),
     ("identification.md", r"or (\d+) times the noise of its velocity", lambda: masks.NOISY),
-    ("identification.md", r"falls by (\d) % or", lambda: 100 * mask_choice.SHARE),
+    ("identification.md", r"falls by (\d) % or", lambda: 100 * used_rows.SHARE),
     ("identification.md", r"noise of ([\d.]+) % of their rms", lambda: 100 * NoisePrefilter().least),
-    ("identification.md", r"to a (\w+) of the rms speed, with edges", lambda: masks.SLOW * mask_choice.REACHES[-1]),
+    ("identification.md", r"to a (\w+) of the rms speed, with edges", lambda: masks.SLOW * used_rows.REACHES[-1]),
     ("identification.md", r"Its edges are (\d+) ms long", lambda: 1000 * masks.ReversalMask().taper),
     ("identification.md", r"with edges of (\d+) ms", lambda: 1000 * masks.WIDE[1] * masks.ReversalMask().taper),
     ("noise.md", r"without a stretch of (\d) s", lambda: leave_out.STRETCH),
-    ("noise.md", r"Logs below (\d+) s have", lambda: uncertainty.ENOUGH),
+    ("noise.md", r"Logs below (\d+) s have", lambda: estimates.ENOUGH),
     ("results-noise.md", r"half width of a joint is ([\d.]+) times", lambda: torque_interval.OTHER_MOTION),
     ("results-noise.md", r"rows of moving joints up to (\d+) Hz", lambda: used_rows.BAND),
     ("identification.md", r"singular values below (\S+) of the largest", lambda: factors.NOT_SHOWN),
@@ -231,7 +230,7 @@ CLAIMS: list[tuple[str, str, Callable[[], object]]] = [
     ("questions.md", r"Fl\s+([\d.]+)\(92\)", lambda: round(device_of("STS3215")["parameters"]["Fl"]["value"], 4)),
     ("recordings.md", r"the logged torque of joint 1 is (\d+) % too large", lambda: 100 * load("gain").torque.gain_error[0]),
     ("recordings.md", r"a wave with (\d+) periods per turn for joint 2", lambda: Robot.load("scara").motors.order[1]),
-    ("recordings.md", r"are thinned to ([\d.]+) Hz", lambda: columns.SHOWN),
+    ("recordings.md", r"are thinned to ([\d.]+) Hz", lambda: stream.SHOWN),
     ("security.md", r"\| (\d+) \| interrupted \|", lambda: INTERRUPTED),
     ("security.md", r"this machine alone \(([\d.]+)\)", lambda: LOOPBACK),
     ("servo.md", r"raise the objective by less than (\d+) times its mean", lambda: servo_fit.MIN_RISE),

@@ -131,14 +131,14 @@ def test_a_scenario_of_0_1_0_is_told_what_to_change(tmp_path, complaint):
 
 def test_servers_are_reached_from_this_machine_alone(monkeypatch):
     """Every server is started with the loopback address, and no code binds another."""
-    from idbench.experiments.recording import viewers
+    from idbench.experiments.recording import audience
 
     started = []
-    monkeypatch.setattr(viewers.subprocess, "Popen", lambda words, **_: started.append(words) or _Ended())
-    monkeypatch.setattr(viewers, "answers", lambda _: True)
-    monkeypatch.setattr(viewers, "require_display", lambda: None)
-    viewers.start_viewer()
-    with viewers.served(_free_pair()):
+    monkeypatch.setattr(audience.subprocess, "Popen", lambda words, **_: started.append(words) or _Ended())
+    monkeypatch.setattr(audience, "answers", lambda _: True)
+    monkeypatch.setattr(audience, "require_display", lambda: None)
+    audience.start_viewer()
+    with audience.served(_free_pair()):
         pass
     assert len(started) == 2
     assert all(words[words.index("--bind") + 1] == "127.0.0.1" for words in started)

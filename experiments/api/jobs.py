@@ -22,8 +22,7 @@ from idbench.experiments.paper.table2 import Table2
 from idbench.experiments.requests import jobs
 from idbench.experiments.requests.table import request_from
 from idbench.experiments.servo.job import ServosFit, servos_identified
-from idbench.experiments.study.job import LARGEST_SHARD, runs_of_shard, worker_pool
-from idbench.experiments.study.run_study import run_missing
+from idbench.experiments.study.job import LARGEST_SHARD, run_missing, runs_of_shard, worker_pool
 from idbench.experiments.study.statistics import Cell, cells
 from idbench.experiments.study.store import Store, arrays
 from idbench.experiments.study.study import Study

@@ -17,9 +17,8 @@ from idbench.experiments.identification.job import summary_of
 from idbench.experiments.identification.load import within
 from idbench.experiments.identification.reading import late, read
 from idbench.experiments.identification.robot_model import RobotModel
-from idbench.experiments.judgement.conclusion import Conclusion, conclusion
 from idbench.experiments.judgement.held_out import Verdict
-from idbench.experiments.judgement.judgement import Judgement, judge
+from idbench.experiments.judgement.judgement import Conclusion, Judgement, conclusion, judge
 from idbench.experiments.judgement.remedies import checks
 from idbench.experiments.requests.shared import LogRequest
 from idbench.experiments.results.attempts import Attempts

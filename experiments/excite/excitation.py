@@ -69,13 +69,11 @@ class FourierExcitation(AbstractExcitation):
         number = moves.count(duration, frequency)
         shapes = Shapes.moves(t, duration, number)
         each = moves.starts(rng, plan, duration, frequency, count)
-        return [self._nearest(plan.states, shapes.at(c), duration / number) for c in each]
-
-    def _nearest(self, states: Shapes, motion: Array, T: float) -> Array:
-        """Return the coefficients of the series with positions, velocities and accelerations nearest to a motion's."""
-        scale = (T / np.pi) ** np.arange(3)[:, None, None]
-        B, y = (states.values[:3] * scale).reshape(-1, states.count), (motion[:3] * scale).reshape(-1, motion.shape[-1])
-        return np.asarray(np.linalg.lstsq(B, y, rcond=None)[0])
+        # Nearest are positions, velocities and accelerations together.
+        scale = (duration / number / np.pi) ** np.arange(3)[:, None, None]
+        B = (plan.states.values[:3] * scale).reshape(-1, plan.states.count)
+        ends = ((shapes.at(c)[:3] * scale).reshape(len(B), -1) for c in each)
+        return [np.asarray(np.linalg.lstsq(B, y, rcond=None)[0]) for y in ends]
 
     def trajectory(self, c: Array, middle: Array, duration: float, repeat: int) -> Fourier:
         """Return the series."""

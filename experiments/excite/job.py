@@ -1,26 +1,106 @@
-"""The job `excite`: a request becomes a design, and that an exciting motion, or a sequence of them."""
+"""The job `excite`: a request becomes a design, and that an exciting motion, or several, each for what is still open."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.excite.design import Design
 from idbench.experiments.excite.excited import Excited
-from idbench.experiments.excite.sequence import MotionSequence
 from idbench.experiments.identification.known import number_of
 from idbench.experiments.identification.reading import file_of, read
 from idbench.experiments.identification.robot_model import RobotModel, absolute
 from idbench.experiments.requests.jobs import ExciteRequest
 from idbench.experiments.requests.shared import LogRequest
-from idbench.identify import TorqueChannel
+from idbench.identify import Array, Estimate, ExplicitModel, MotionLog, TorqueChannel, brisk_shares, identify
 from idbench.sim.encoders import IncrementalEncoder
+from idbench.sim.engine.simulation import Progress, simulate
 from idbench.sim.limits.motion_limits import MotionLimits, limits_of
 from idbench.sim.scenario.measurement import TorqueMeasurement
 from idbench.sim.scenario.scenario import Scenario
 from idbench.sim.scenario.scenario_file import load
+
+ENOUGH = 0.1  # Weight of a parameter that is known well enough
+ROUNDS = 12  # Motions after which it ends, whatever is known
+
+
+@dataclass(frozen=True, eq=False)
+class Round:
+    """A motion, its log, and what all logs so far say."""
+
+    excited: Excited
+    """The motion."""
+    log: MotionLog
+    """What was logged."""
+    estimate: Estimate
+    """Parameters from all logs so far."""
+    shares: Array
+    """What one sigma of each parameter makes of a brisk motion's torque, shape (p,)."""
+
+    @property
+    def share(self) -> float:
+        """The largest of the shares."""
+        return float(self.shares.max())
+
+    @property
+    def weakest(self) -> str:
+        """The parameter that has it."""
+        return self.excited.design.robot_model.basis.names[int(self.shares.argmax())]
+
+
+@dataclass(frozen=True, eq=False)
+class MotionSequence:
+    """Motions until every parameter is known well enough."""
+
+    rounds: tuple[Round, ...]
+    """One a motion."""
+    wished: float
+    """Share that was asked for."""
+    interrupted: bool = False
+    """Whether it was ended before its time."""
+
+    @classmethod
+    def of(cls, design: Design, wished: float, progress: Progress | None = None) -> "MotionSequence":
+        """Design, simulate and identify until one sigma of each parameter makes less than `wished` of a brisk torque.
+
+        After ROUNDS motions, or Ctrl-C, it ends with what there is.
+        """
+        rounds, weights = list[Round](), design.weights
+        logs, model = design.logs, design.robot_model
+        try:
+            for number in range(ROUNDS):
+                excited = Excited.of(replace(design, logs=logs, seed=design.seed + number, weights=weights), progress)
+                logs = (*logs, simulate(replace(excited.scenario, seed=design.scenario.seed + number)).alone())
+                estimate = identify(logs, model.basis, ExplicitModel())
+                shares = brisk_shares(model.tree, model.basis, estimate.X, estimate.standard_errors)
+                rounds.append(Round(excited, logs[-1], estimate, shares))
+                if rounds[-1].share < wished or excited.interrupted:
+                    break
+                each = zip(model.basis.names, shares, strict=True)  # what is not known well enough counts as much more
+                weights = {name: float(design.weights.get(name, 1.0) * max(ENOUGH, x / wished)) for name, x in each}
+        except KeyboardInterrupt:
+            if not rounds:
+                raise
+            return cls(tuple(rounds), wished, interrupted=True)
+        return cls(tuple(rounds), wished, rounds[-1].excited.interrupted)
+
+    @property
+    def reached(self) -> bool:
+        """Whether every parameter is known well enough."""
+        return self.rounds[-1].share < self.wished
+
+    def summary(self) -> dict[str, Any]:
+        """Its part of summary.json."""
+        return {"until": self.wished, "reached": self.reached, "rounds": [_summary(each) for each in self.rounds]}
+
+
+def _summary(found: Round) -> dict[str, Any]:
+    X, sigma = found.estimate.X.tolist(), found.estimate.standard_errors.tolist()
+    return {"brisk_share": found.share, "weakest": found.weakest, "estimate": X, "sigma": sigma}
+
 
 LONGEST, FASTEST = 3600.0, 10000.0
 """Time of a motion, repeated [s], and sampling frequency [Hz] above which they are taken for a slip."""
@@ -39,7 +119,10 @@ def excited(asked: ExciteRequest, progress: Callable[[float], None]) -> tuple[Ex
     design = designed(asked)
     if asked.until is None:
         return Excited.of(design, progress), None
-    sequence = MotionSequence.of(design, _percent(asked.until), progress)
+    share = (number_of(asked.until.removesuffix("%")) or 0.0) / 100
+    if not 0 < share < 1:
+        raise ExperimentError(f"--until {asked.until}: give a share between 0 and 100 %, such as 0.1%")
+    sequence = MotionSequence.of(design, share, progress)
     return sequence.rounds[-1].excited, sequence
 
 
@@ -129,14 +212,6 @@ def _weights(given: tuple[str, ...]) -> Mapping[str, float]:
         if not 1e-6 <= found[name] <= 1e6:
             raise ExperimentError(f"--weigh {text}: give a parameter and a weight from 1e-6 to 1e6, such as LMY2=4")
     return found
-
-
-def _percent(text: str) -> float:
-    """Return a share given in percent."""
-    share = (number_of(text.removesuffix("%")) or 0.0) / 100
-    if not 0 < share < 1:
-        raise ExperimentError(f"--until {text}: give a share between 0 and 100 %, such as 0.1%")
-    return share
 
 
 PARTS = "part: 0 the way from home to the start, 1 the motion, with its rest at both ends, 2 the way back"

@@ -4,7 +4,7 @@ import re
 from math import isfinite, isnan
 from pathlib import Path
 
-from idbench.experiments.exports.code import OPERATIONS, Content, Language, body, identifiers
+from idbench.experiments.exports.code import OPERATIONS, Content, Language, body, identifiers, template
 from idbench.experiments.exports.functions import Function
 
 OF_INTERVAL = {
@@ -30,33 +30,6 @@ def c_texts(content: Content, path: Path) -> dict[str, str]:
     return {".c": _source(content, name, f"{path.stem}.h"), ".h": _header(content, name)}
 
 
-def _opening(content: Content, upper: str, name: str) -> str:
-    """Return the header's beginning: what it is of, and the type of its numbers."""
-    of = content.functions
-    return f"""/* {_comment(f"{of.tree.name}: {content.origin}")}.
-
-   Joints: {_comment(", ".join(joint.name for joint in of.tree.joints))}.
-   Units are rad, rad/s, rad/s^2 and N m (m and N of slides).
-   Compile with -D{upper}_REAL=float for single precision, and with -lm.
-*/
-#ifndef {upper}_H
-#define {upper}_H
-
-#include <math.h>
-
-#ifndef {upper}_REAL
-#define {upper}_REAL double
-#endif
-
-#ifdef __cplusplus
-extern "C" {{
-#endif
-
-typedef {upper}_REAL {name}_real;
-
-"""
-
-
 def _header(content: Content, name: str) -> str:
     of, upper = content.functions, name.upper()
     used = sorted(of.used)
@@ -69,30 +42,18 @@ def _header(content: Content, name: str) -> str:
         *("{0}" for _ in used),
     ]
     declared = "\n".join(f"/* {f.about} */\n{_prototype(f, name)};" for f in of.functions)
-    return f"""{_opening(content, upper, name)}#define {upper}_JOINTS {of.n}
-#define {upper}_PARAMETERS {len(content.names)}
-
-/* Base parameters: those of links are sums of standard ones, as `idbench robot` prints them. */
-struct {name}_parameters {{
-{chr(10).join(fields)}
-}};
-
-/* As identified: const struct {name}_parameters p = {upper}_IDENTIFIED; */
-#define {upper}_IDENTIFIED {{ \\
-    {(", " + chr(92) + chr(10) + "    ").join(groups)} \\
-}}
-
-{declared}
-/* Half widths of 95 % intervals of the torques up to {content.interval["band"][0]:g} Hz [N m], within the speeds of the fit. */
-void {name}_torque_interval(const struct {name}_parameters *p, {name}_real *half);
-/* Number of joints that are faster, or have a larger torque, than in 99 % of the fit. */
-int {name}_outside_fit(const {name}_real *q, const {name}_real *qd, const {name}_real *qdd, const struct {name}_parameters *p);
-
-#ifdef __cplusplus
-}}
-#endif
-#endif
-"""
+    return template("header.h").substitute(
+        about=_comment(f"{of.tree.name}: {content.origin}"),
+        joints=_comment(", ".join(joint.name for joint in of.tree.joints)),
+        upper=upper,
+        name=name,
+        n=of.n,
+        p=len(content.names),
+        fields="\n".join(fields),
+        values=", \\\n    ".join(groups),
+        declared=declared,
+        band=f"{content.interval['band'][0]:g}",
+    )
 
 
 def _source(content: Content, name: str, header: str) -> str:
@@ -103,31 +64,9 @@ def _source(content: Content, name: str, header: str) -> str:
         "    const real {} = {};",
     )
     written = "\n".join(_defined(content, language, function, name) for function in content.functions.functions)
-    n = content.functions.n
-    return f"""/* {_comment(f"{content.functions.tree.name}: {content.origin}")}. */
-
-#include "{header}"
-#include <tgmath.h>
-
-typedef {name}_real real;
-
-#define SIGN(x) ((real)(((x) > 0) - ((x) < 0)))
-
-{written}
-void {name}_torque_interval(const struct {name}_parameters *p, real *half)
-{{
-    for (int j = 0; j < {n}; j++) half[j] = p->half_width[j];
-}}
-
-int {name}_outside_fit(const real *q, const real *qd, const real *qdd, const struct {name}_parameters *p)
-{{
-    real tau[{n}];
-    int count = 0;
-    {name}_inverse_dynamics(q, qd, qdd, p, tau);
-    for (int j = 0; j < {n}; j++) count += fabs(qd[j]) > p->fitted_speed[j] || fabs(tau[j]) > p->fitted_torque[j];
-    return count;
-}}
-"""
+    about = _comment(f"{content.functions.tree.name}: {content.origin}")
+    words = {"about": about, "header": header, "name": name, "functions": written, "n": content.functions.n}
+    return template("source.c").substitute(words)
 
 
 def _prototype(function: Function, name: str, real: str = "") -> str:

@@ -6,6 +6,8 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from importlib.resources import files
+from string import Template
 
 from idbench.experiments.exports.functions import Function, RobotFunctions
 from idbench.identify.basis.tape import Step, Symbol, Tape
@@ -100,6 +102,11 @@ def identifiers(names: Sequence[str]) -> list[str]:
             plain += "_"
         found.append(plain)
     return found
+
+
+def template(name: str) -> Template:
+    """What a written file says of every robot, with $words in the places of what varies."""
+    return Template(files("idbench.experiments.exports").joinpath(f"{name}.txt").read_text(encoding="utf-8"))
 
 
 @dataclass(frozen=True, eq=False)

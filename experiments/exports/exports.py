@@ -5,11 +5,11 @@ import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from importlib.metadata import version
+from math import nan
 from pathlib import Path
 
 import numpy as np
 
-from idbench.experiments.exports.base_parameters import interval_of, json_text
 from idbench.experiments.exports.c_code import c_texts
 from idbench.experiments.exports.code import Content
 from idbench.experiments.exports.functions import require_formulas
@@ -17,8 +17,9 @@ from idbench.experiments.exports.python_code import python_text
 from idbench.experiments.identification.consistent_robot import WrittenRobot
 from idbench.experiments.identification.fit import Fit
 from idbench.experiments.identification.robot_model import RobotModel
-from idbench.experiments.results.writing import require_free, require_free_folder
+from idbench.experiments.results.writing import finite, require_free, require_free_folder
 from idbench.identify.basis.block import named
+from idbench.identify.data.kinematics import INERTIAL
 from idbench.sim.robot.rewrite import rewritten
 from idbench.sim.robot.tree import standard_parameters
 
@@ -68,7 +69,7 @@ def mjcf(fit: Fit, model: str, path: Path) -> Exported:
 
 def urdf(fit: Fit, model: str, path: Path) -> Exported:
     """The robot as URDF with the parameters, and what readers of it do not have."""
-    from idbench.sim.robot.write_urdf import urdf_text
+    from idbench.sim.robot.written_xml import urdf_text
 
     written, robot_model = WrittenRobot(fit, model), fit.robot_model
     text = urdf_text(robot_model.name, robot_model.robot, robot_model.tree, written.values, robot_model.mounting)
@@ -80,7 +81,7 @@ def urdf(fit: Fit, model: str, path: Path) -> Exported:
 
 def sdf(fit: Fit, model: str, path: Path) -> Exported:
     """The robot as SDF with the parameters, and what readers of it do not have."""
-    from idbench.sim.robot.write_sdf import sdf_text
+    from idbench.sim.robot.written_xml import sdf_text
 
     written, robot_model = WrittenRobot(fit, model), fit.robot_model
     text = sdf_text(robot_model.robot, robot_model.tree, written.values)
@@ -165,9 +166,74 @@ class FileKind:
         yield from (path.with_name(path.stem + ending) for ending in self.beside)
 
 
+ABOUT = (
+    "tau = D(q, qd, qdd) X: X are `parameters`, each the sum of standard parameters in `made_of`. D has the columns of the "
+    "standard parameters `column`, over `scale`: those of links from the tree (inertia about the origin of the link's frame "
+    "and in its axes, first moments, mass), Ia: qdd of its joint, Fv: qd, Fs: sign(qd), off: 1. `torque_interval` has half "
+    "widths of 95 % intervals of tau, and the speeds and torques that 99 % of the fit stayed below."
+)
+
+
 def base_parameters(fit: Fit, model: str, path: Path) -> Exported:
     """Return base parameters, their covariance and what the regressor is made of."""
     return Exported({path: json_text(fit, model)})
+
+
+def json_text(fit: Fit, model: str) -> str:
+    """Return the text: parameters, sigma, covariance, the tree of links, and which columns the regressor has."""
+    robot_model, estimate = fit.robot_model, fit.estimates[model]
+    base, standard = robot_model.grouping, robot_model.grouping.standard
+    made_of = [base.K[base.parameters.index(p)] for p in fit.basis.parameters]
+    parameters = [
+        {
+            "name": p.name,
+            "value": float(x),
+            "sigma": float(s),
+            "unit": p.unit,
+            "kind": p.kind,
+            "joint": p.joint,
+            "column": standard.names[standard.places[p]],
+            "scale": p.scale,
+            "made_of": {standard.names[k]: float(row[k]) for k in np.flatnonzero(row)},
+        }
+        for p, x, s, row in zip(fit.basis.parameters, estimate.X, estimate.standard_errors, made_of, strict=True)
+    ]
+    content = {
+        "format": "idbench base parameters 1",
+        "version": version("idbench"),
+        "about": ABOUT,
+        "robot": robot_model.tree.name,
+        "model": model,
+        "estimator": fit.request.method.estimator_name,
+        "logs": list(fit.logs.names),
+        "parameters": parameters,
+        "covariance": np.asarray(estimate.covariance).tolist(),
+        "torque_interval": {name: [finite(x) for x in of] for name, of in interval_of(fit, model).items()},
+        "letters_of_links": list(INERTIAL),
+        "gravity": [float(x) for x in robot_model.tree.gravity],
+        "tree": [
+            {
+                "joint": joint.name,
+                "kind": joint.kind,
+                "parent": joint.parent,
+                "position": joint.position.tolist(),
+                "rotation": joint.rotation.tolist(),
+                "axis": joint.axis.tolist(),
+                "anchor": joint.anchor.tolist(),
+                "zero": float(joint.zero),
+            }
+            for joint in robot_model.tree.joints
+        ],
+    }
+    return json.dumps(content, indent=1, allow_nan=False) + "\n"
+
+
+def interval_of(fit: Fit, model: str) -> dict[str, list[float]]:
+    """Return the half widths of the torques' intervals, the fitted speeds and torques, and the band [Hz]; NaN if not known."""
+    interval, nothing = fit.torque_intervals[model], [nan] * fit.basis.n
+    if interval is None:
+        return dict.fromkeys(("half", "speed", "torque"), nothing) | {"band": [nan]}
+    return {name: getattr(interval, name).tolist() for name in ("half", "speed", "torque")} | {"band": [interval.band]}
 
 
 def python_module(fit: Fit, model: str, path: Path) -> Exported:

@@ -5,108 +5,10 @@ from math import isfinite, isnan
 from pprint import pformat
 from textwrap import fill
 
-from idbench.experiments.exports.code import OPERATIONS, Content, Language, body
+from idbench.experiments.exports.code import OPERATIONS, Content, Language, body, template
 from idbench.experiments.exports.functions import Function
 
 TAB = 4 * " "  # How lines are indented
-
-HEAD = '''"""{name}: {origin}.
-
-    tau = inverse_dynamics(q, qd, qdd)
-
-takes joints in the order of JOINTS, in rad, rad/s, rad/s^2 and N m (m and N of slides): lists of numbers, arrays of NumPy
-of shape (..., {n}), or lists of symbols of CasADi or SymPy. Parameters of links are base parameters: masses and
-inertias of single links are no physical ones, their torques are exact. It needs nothing but Python.
-"""
-
-import math
-import sys
-from types import SimpleNamespace
-from typing import NamedTuple
-
-JOINTS = {joints}
-
-
-class Parameters(NamedTuple):
-    """Base parameters, with what a log says beside motion and torque."""
-
-{fields}
-
-
-IDENTIFIED = Parameters(
-{values}
-)
-SIGMA = {sigma}
-
-# Of each joint: half widths of 95 % intervals of the torques up to BAND [Hz]; 99 % of the fit's speeds and torques are smaller.
-HALF_WIDTHS = {half}
-BAND, = {band}
-FITTED_SPEEDS = {speed}
-FITTED_TORQUES = {torque}
-
-
-'''
-
-TAIL = '''
-def torque_interval(q, qd, qdd):
-    """Return half widths of 95 % intervals of the torques up to BAND [N m], shape (..., {n}); nan where a joint is too fast."""
-
-    def half(f, p, q, qd, qdd):
-        each = zip(qd, HALF_WIDTHS, FITTED_SPEEDS)
-        return [f.where(f.abs(v) > speed, math.nan, width) for v, width, speed in each]
-
-    return _called(half, ({n},), None, (q, qd, qdd))
-
-
-def outside_fit(q, qd, qdd, p=IDENTIFIED):
-    """Return where a joint is faster, or has a larger torque, than in 99 % of the fit, shape (..., {n})."""
-    tau = inverse_dynamics(q, qd, qdd, p)
-    if hasattr(qd, "ndim"):
-        numpy = sys.modules["numpy"]
-        return (abs(qd) > numpy.asarray(FITTED_SPEEDS)) | (abs(tau) > numpy.asarray(FITTED_TORQUES))
-    each = zip(qd, tau, FITTED_SPEEDS, FITTED_TORQUES)
-    return [abs(v) > speed or abs(x) > torque for v, x, speed, torque in each]
-
-
-MATHEMATICS = (
-    "sin", "cos", "tan", "sinh", "cosh", "tanh", "atan", "asinh", "exp", "expm1", "log", "log1p", "sqrt", "hypot", "copysign",
-)
-NUMBERS = SimpleNamespace(
-    **{x: getattr(math, x) for x in MATHEMATICS}, abs=abs, max=max, min=min,
-    sign=lambda x: float(x > 0) - float(x < 0), where=lambda condition, a, b: a if condition else b,
-)
-NAMES = {
-    "abs": ("fabs", "abs", "Abs"), "max": ("fmax", "maximum", "Max"), "min": ("fmin", "minimum", "Min"), "sign": ("sign",),
-    "atan": ("atan", "arctan"), "asinh": ("asinh", "arcsinh"), "where": ("if_else", "where"),
-}
-
-
-def _functions_of(values):
-    """Return the functions for values: those of the package that symbols among them are from."""
-    symbol = next((x for x in values if not isinstance(x, (int, float))), None)
-    if symbol is None:
-        return NUMBERS
-    package = sys.modules[type(symbol).__module__.partition(".")[0]]
-
-    def found(name):
-        return next((getattr(package, other) for other in NAMES.get(name, (name,)) if hasattr(package, other)), None)
-
-    return SimpleNamespace(**{name: found(name) for name in vars(NUMBERS)})
-
-
-def _called(function, shape, p, motion):
-    """Return what a function gives: a list for lists, an array for arrays of NumPy, with more axes first."""
-    if not hasattr(motion[0], "ndim"):
-        return function(_functions_of([x for each in motion for x in each]), p, *motion)
-    numpy = sys.modules["numpy"]
-    motion = [numpy.asarray(x, dtype=float) for x in motion]
-    if motion[0].ndim == 1:
-        return numpy.asarray(function(NUMBERS, p, *(x.tolist() for x in motion))).reshape(shape)
-    functions = _functions_of([motion[0]])
-    values = function(functions, p, *([x[..., j] for j in range(len(JOINTS))] for x in motion))
-    zero = 0.0 * sum(x[..., 0] for x in motion)
-    return numpy.stack([zero + x for x in values], -1).reshape((*zero.shape, *shape))
-'''
 
 
 def python_text(content: Content) -> str:
@@ -121,7 +23,7 @@ def python_text(content: Content) -> str:
     used = sorted(of.used)
     fields = [f"    {name}: float  # {unit}" for name, unit in zip(content.names, of.basis.units, strict=True)]
     fields += [f"    {name}: tuple = (0.0,) * {of.n}  # as the log has it" for name in used]
-    head = HEAD.format(
+    return template("module.py").substitute(
         name=_quoted(of.tree.name),
         origin=_quoted(content.origin),
         n=of.n,
@@ -130,9 +32,8 @@ def python_text(content: Content) -> str:
         values="\n".join(f"    {name}={_constant(x)}," for name, x in zip(content.names, content.values, strict=True)),
         sigma=_listed([_number(x) for x in content.sigma]),
         **{part: _listed([_number(x) for x in values]) for part, values in content.interval.items()},
+        functions="\n\n".join(_defined(content, language, function) for function in of.functions),
     )
-    functions = "\n\n".join(_defined(content, language, function) for function in of.functions)
-    return f"{head}{functions}\n{TAIL.replace('{n}', str(of.n))}"
 
 
 def _quoted(text: str) -> str:

@@ -7,12 +7,14 @@ from typing import Any
 import numpy as np
 import tomli_w
 
+from idbench.experiments.exports.code import template
 from idbench.experiments.exports.ensemble import DRAWS, LENGTH, Ensemble, FreeRuns, fields_of
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.reports.panels import Panel, stacked
 from idbench.identify import Array
 from idbench.identify.arrays import TINY
 
+CODE = ("_mjlab.py", "_isaaclab.py", "_playground.py")  # Endings of the names of code for training frameworks
 PICTURE = "_band.svg"  # Ending of the name of the picture of the band
 QUANTILES = {"low": 0.025, "middle": 0.5, "high": 0.975}
 """The middle of a value, and the ends of the range that holds 95 % of the robots."""
@@ -28,9 +30,9 @@ def texts(ensemble: Ensemble, path: Path) -> dict[Path, str]:
     table = ranges(ensemble)
     about = f"{ensemble.fit.robot_model.tree.name}, identified by idbench {version('idbench')}"
     made = {path: tomli_w.dumps(table)}
-    for ending, (target, code) in CODE.items():
-        head = HEAD.format(about=about, target=target, draws=DRAWS)
-        made[path.with_name(path.stem + ending)] = head + code.replace("{tables}", _tables(table))
+    for ending in CODE:
+        text = template(f"ranges{ending}").substitute(about=about, draws=DRAWS, tables=_tables(table))
+        made[path.with_name(path.stem + ending)] = text
     if ensemble.bands:
         made[path.with_name(path.stem + PICTURE)] = picture(ensemble.bands[0], ensemble.fit.robot_model)
     return made
@@ -117,118 +119,3 @@ def _tables(table: dict[str, Any]) -> str:
         rows = "".join(f"    {name!r}: {low_high},\n" for name, low_high in ends.items())
         texts.append(f"{value.upper()} = {{\n{rows}}}\n")
     return "\n".join(texts)
-
-
-HEAD = '''"""Ranges of {about}, for {target}: 95 % of {draws} robots.
-
-Values are drawn one by one here. They are correlated: where that matters, load robots of the ensemble instead.
-"""
-
-'''
-
-MJLAB = '''import re
-
-from mjlab.envs.mdp import dr
-from mjlab.managers.event_manager import EventTermCfg
-from mjlab.managers.scene_entity_config import SceneEntityCfg
-
-{tables}
-
-def _event(function, ranges, entity):
-    params = {"ranges": {re.escape(name): x for name, x in ranges.items()}, "operation": "abs"}
-    return EventTermCfg(mode="startup", func=function, params={**params, "asset_cfg": SceneEntityCfg(entity)})
-
-
-def events(entity="robot"):
-    """Return event terms for the events of an environment's configuration."""
-    return {
-        "identified_armature": _event(dr.joint_armature, ARMATURE, entity),
-        "identified_damping": _event(dr.joint_damping, DAMPING, entity),
-        "identified_friction": _event(dr.joint_friction, FRICTIONLOSS, entity),
-        "identified_mass": _event(dr.body_mass, MASS, entity),
-    }
-'''
-
-ISAACLAB = '''import re
-
-import isaaclab.envs.mdp as mdp
-from isaaclab.managers import EventTermCfg, SceneEntityCfg
-
-{tables}
-
-def events(entity="robot"):
-    """Return event terms, by name, for the events of an environment's configuration.
-
-    FRICTIONLOSS is the Coulomb part of PhysX's friction of joints; DAMPING belongs to the actuator's configuration.
-    """
-    found = {}
-    for joint in ARMATURE:
-        found[f"identified_{joint}"] = EventTermCfg(
-            func=mdp.randomize_joint_parameters,
-            mode="startup",
-            params={
-                "asset_cfg": SceneEntityCfg(entity, joint_names=re.escape(joint)),
-                "armature_distribution_params": ARMATURE[joint],
-                "friction_distribution_params": FRICTIONLOSS[joint],
-                "operation": "abs",
-                "distribution": "uniform",
-            },
-        )
-    for body in MASS:
-        found[f"identified_mass_{body}"] = EventTermCfg(
-            func=mdp.randomize_rigid_body_mass,
-            mode="startup",
-            params={
-                "asset_cfg": SceneEntityCfg(entity, body_names=re.escape(body)),
-                "mass_distribution_params": MASS[body],
-                "operation": "abs",
-            },
-        )
-    return found
-'''
-
-PLAYGROUND = '''import jax
-import jax.numpy as jp
-
-{tables}
-
-def randomizer(mj_model):
-    """Return what Playground takes as `randomization_fn`, for models that have these joints and bodies by their names."""
-
-    def places(names, of):
-        return jp.array([of(name) for name in names])
-
-    def ends(ranges):
-        low, high = zip(*ranges.values())
-        return jp.array(low), jp.array(high)
-
-    dofs = places(ARMATURE, lambda name: mj_model.jnt_dofadr[mj_model.joint(name).id])
-    bodies = places(MASS, lambda name: mj_model.body(name).id)
-    fields = {
-        "dof_armature": (dofs, *ends(ARMATURE)),
-        "dof_damping": (dofs, *ends(DAMPING)),
-        "dof_frictionloss": (dofs, *ends(FRICTIONLOSS)),
-        "body_mass": (bodies, *ends(MASS)),
-    }
-
-    def randomize(model, rng):
-        def drawn(key):
-            keys = dict(zip(fields, jax.random.split(key, len(fields))))
-            return {
-                name: getattr(model, name).at[at].set(jax.random.uniform(keys[name], low.shape, minval=low, maxval=high))
-                for name, (at, low, high) in fields.items()
-            }
-
-        values = jax.vmap(drawn)(rng)
-        axes = jax.tree_util.tree_map(lambda _: None, model).tree_replace(dict.fromkeys(fields, 0))
-        return model.tree_replace(values), axes
-
-    return randomize
-'''
-
-CODE = {
-    "_mjlab.py": ("mjlab", MJLAB),
-    "_isaaclab.py": ("Isaac Lab", ISAACLAB),
-    "_playground.py": ("MuJoCo Playground", PLAYGROUND),
-}
-"""Endings of the files of code -> what they are for, and how they are written."""

@@ -16,9 +16,9 @@ from idbench.identify import ESTIMATORS, MODELS, ExcitationError, Identification
 from idbench.identify.arrays import TINY
 from idbench.identify.data.motion_log import never_logged
 from idbench.identify.judge.diagnosis import diagnosed, silent_joint, still_joints, unlogged, unrelated_joint
-from idbench.identify.judge.mask_choice import suited_reach
 from idbench.identify.judge.stretches import held_out_errors
 from idbench.identify.judge.suspect import Suspect
+from idbench.identify.judge.used_rows import suited_reach
 from idbench.identify.parameters.prior import evident_sizes
 
 SPOILT = 0.5

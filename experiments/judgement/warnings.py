@@ -8,7 +8,7 @@ from idbench.experiments.identification.fit import Fit
 from idbench.experiments.identification.log_warnings import resting, unlike_file, warnings_of_base
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.note import Note
-from idbench.identify import MotionLog, brisk_shares, showing_moves
+from idbench.identify import brisk_shares, showing_moves
 from idbench.identify.basis.block import NOT_NEGATIVE, Kind, named
 from idbench.identify.data.motion_log import never_logged
 from idbench.identify.judge.diagnosis import DRIVING
@@ -191,17 +191,13 @@ def wrong_sign(fit: Fit) -> list[Note]:
             wrong.append(joint)
     if not wrong:
         return []
-    work = _work(fit.logs.fitted[0])
+    log = fit.logs.fitted[0]
+    tau = log.tau * np.asarray(log.torque.gain)
+    work = float(np.sum((tau[1:] + tau[:-1]) / 2 * np.diff(log.q, axis=0)))  # of all torques [J]
     balance = f", and the torques of the log take out {-work:.3g} J in all" if work < 0 else ""
     finding = f"friction drives {', '.join(wrong)} in the {model} model{balance}"
     asked = "does the torque have the wrong sign (it must be that on the joint, positive where it speeds up a positive motion)?"
     return [Note(f"{finding}: {asked}", finding=finding)]
-
-
-def _work(log: MotionLog) -> float:
-    """Return the work of all torques [J]."""
-    tau = log.tau * np.asarray(log.torque.gain)
-    return float(np.sum((tau[1:] + tau[:-1]) / 2 * np.diff(log.q, axis=0)))
 
 
 def _poorly_known(fit: Fit) -> list[str]:

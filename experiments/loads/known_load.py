@@ -125,14 +125,12 @@ class LoadJudgement:
     def warnings(self, payload: PayloadEstimate | None) -> dict[str, list[str]]:
         """Warnings by subject."""
         of_payload_ = [*self._of_stated(), *(_of_body(payload, self.names[len(self.robot.without) :]) if payload else ())]
-        return {LOG: list(self._of_logs()), PAYLOAD: of_payload_, MODEL: list(self._of_fit())}
-
-    def _of_logs(self) -> Iterator[str]:
-        """Yield what is suspicious about each log by itself, by the robot alone: its last link includes the payload."""
-        for name, log in zip(self.names, (*self.robot.without, *self.robot.loaded), strict=True):
-            yield from (f"{name}: {doubt}" for doubt in self._of_log(log))
+        logs = zip(self.names, (*self.robot.without, *self.robot.loaded), strict=True)
+        of_logs = [f"{name}: {doubt}" for name, log in logs for doubt in self._of_log(log)]
+        return {LOG: of_logs, PAYLOAD: of_payload_, MODEL: list(self._of_fit())}
 
     def _of_log(self, log: MotionLog) -> list[str]:
+        """What is suspicious about a log by itself, by the robot alone: its last link includes the payload."""
         tree = self.request.robot_model.tree
         found = [*warnings_of_log(log, tree), *unchanging(log, tree)]
         try:

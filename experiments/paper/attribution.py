@@ -8,7 +8,7 @@ the power model alone; a gain error scales everything.
 from dataclasses import dataclass, replace
 from typing import TypeAlias
 
-from idbench.experiments.study.run_study import LocalPool
+from idbench.experiments.study.job import LocalPool
 from idbench.identify import (
     Array,
     AsLogged,
@@ -90,7 +90,10 @@ class Attribution:
         found = dict[str, Errors]()
         try:
             for one in self._imperfections:
-                found[one.name] = errors_of(one, *self._logs[self._scenarios.index(one.scenario)].result())
+                log, truth = self._logs[self._scenarios.index(one.scenario)].result()
+                assumed = MotionLog(log.fs, log.q, log.tau, one.assumed or log.torque)
+                estimates = identify_each(assumed, scara(), COMPARED, one.chain, WeightedLeastSquares())
+                found[one.name] = {form: estimate.error_percent(truth) for form, estimate in estimates.items()}
                 if progress:
                     progress(len(found) / len(self._imperfections))
         finally:
@@ -100,13 +103,6 @@ class Attribution:
     def stop(self) -> None:
         """End simulations that are not finished."""
         self._pool.close()
-
-
-def errors_of(imperfection: Imperfection, log: MotionLog, truth: list[float]) -> Errors:
-    """Return the signed error [%] of every parameter in each model."""
-    assumed = MotionLog(log.fs, log.q, log.tau, imperfection.assumed or log.torque)
-    estimates = identify_each(assumed, scara(), COMPARED, imperfection.chain, WeightedLeastSquares())
-    return {form: estimate.error_percent(truth) for form, estimate in estimates.items()}
 
 
 def _simulated(scenario: Scenario, progress: Progress) -> tuple[MotionLog, list[float]]:

@@ -23,7 +23,7 @@ from rich.text import Text
 
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.paper.table1 import PAPER
-from idbench.experiments.study.run_study import local_pool
+from idbench.experiments.study.job import local_pool
 from idbench.experiments.study.study import Study
 from idbench.experiments.study.study_file import load_study
 from idbench.experiments.text import new_table, print_titled

@@ -21,7 +21,7 @@ from idbench.experiments.identification.method import Method
 from idbench.experiments.identification.request import Request
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.paper.attribution import Attribution, Errors
-from idbench.experiments.paper.table1 import conclusion_line, settled
+from idbench.experiments.paper.table1 import conclusion_line, paper_columns, settled
 from idbench.experiments.text import new_table, percent, print_table, printed
 from idbench.identify import Estimate, TorqueChannel
 from idbench.sim.engine.run import Run
@@ -52,23 +52,7 @@ class Table2Column:
     """Cond(W)."""
 
 
-_DYNAMIC = Table2Column(
-    (3.38, -0.18, 0.59, 0.060, 0.119, 0.001, 0.012, 0.12),
-    (0.025, 0.046, 0.024, 0.002, 0.002, 0.001, 0.007, 0.02),
-    (0.37, 13, 2.1, 2, 0.63, 50, 30, 6.6),
-    37,
-)
-
-PAPER: Mapping[str, Table2Column] = {
-    "explicit": _DYNAMIC,
-    "implicit": _DYNAMIC,
-    "power": Table2Column(
-        (3.39, -0.21, 0.61, 0.0633, 0.121, -0.001, 0.012, 0.12),
-        (0.025, 0.04, 0.03, 0.0005, 0.001, 0.001, 0.002, 0.01),
-        (0.37, 8.6, 2.8, 0.4, 0.5, 53, 7, 4),
-        111,
-    ),
-}
+PAPER: Mapping[str, Table2Column] = {model: Table2Column(**of) for model, of in paper_columns("table2").items()}
 """Table 2 of the paper."""
 
 PAPER_ROWS = 1600  # r of every column of Table 2 (section 7.3)

@@ -7,9 +7,8 @@ import numpy as np
 import numpy.typing as npt
 import rerun as rr
 
-from idbench.experiments.recording.columns import part
 from idbench.experiments.recording.scales import AbstractScale
-from idbench.experiments.recording.stream import Stream
+from idbench.experiments.recording.stream import Stream, part
 from idbench.experiments.text import Color
 from idbench.identify import Array
 

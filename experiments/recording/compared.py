@@ -12,7 +12,7 @@ import numpy as np
 import scipy
 
 from idbench.experiments.errors import ExperimentError, ResultsError
-from idbench.experiments.recording.columns import part
+from idbench.experiments.recording.stream import part
 from idbench.experiments.text import with_unit
 from idbench.identify import Array, LogError, MotionLog
 from idbench.identify.arrays import TINY

@@ -19,7 +19,6 @@ from idbench.experiments.paper.table1 import Table1, table1_markdown
 from idbench.experiments.paper.table2 import PAPER, Table2
 from idbench.experiments.recording.audience import Audience
 from idbench.experiments.recording.chart import NARROW, SYMBOLS, Chart, send_keys
-from idbench.experiments.recording.columns import NANOSECONDS, part, seconds
 from idbench.experiments.recording.compared import Compared, difference, differences, estimates, named_runs, shift_of
 from idbench.experiments.recording.folder import BASE, INNER, files
 from idbench.experiments.recording.identification_layer import Layer
@@ -28,7 +27,7 @@ from idbench.experiments.recording.lanes import about
 from idbench.experiments.recording.layouts import tabs
 from idbench.experiments.recording.motion_layer import Base
 from idbench.experiments.recording.scales import listed, signed
-from idbench.experiments.recording.stream import SIZES, Stream
+from idbench.experiments.recording.stream import NANOSECONDS, SIZES, Stream, part, seconds
 from idbench.experiments.text import FORM_WIDTHS, FORMS, GREY, joint_colors, lighter, markdown, model_color, with_unit
 from idbench.identify import scara
 from idbench.sim.scenario.scenario_file import to_toml

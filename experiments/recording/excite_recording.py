@@ -7,12 +7,11 @@ from idbench.experiments.excite.excited import STRETCHES, Excited
 from idbench.experiments.excite.limit_use import FS
 from idbench.experiments.recording.audience import Audience
 from idbench.experiments.recording.chart import MAX_ROWS, SQUARE, Chart, in_charts
-from idbench.experiments.recording.columns import part, seconds
 from idbench.experiments.recording.folder import BASE
 from idbench.experiments.recording.identification_recording import recording_id
 from idbench.experiments.recording.motion_layer import Base
 from idbench.experiments.recording.scales import decades, linear, listed
-from idbench.experiments.recording.stream import Stream
+from idbench.experiments.recording.stream import Stream, part, seconds
 from idbench.experiments.reports.excite import lines
 from idbench.experiments.text import FORMS, GREY, Color, joint_colors
 from idbench.sim.scenario.scenario_file import to_toml

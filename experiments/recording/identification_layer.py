@@ -1,21 +1,39 @@
-"""The layer of an identification: what its models make of a recorded motion, and their residuals."""
+"""The layer of an identification: what its models make of a recorded motion, and their residuals; or of one that grows."""
 
+import sys
 from collections.abc import Sequence
 
 import numpy as np
 import rerun as rr
 
+from idbench.experiments.errors import reason, report
 from idbench.experiments.identification.fit import Fit
+from idbench.experiments.identification.fitting import fit
+from idbench.experiments.identification.logs import Logs
+from idbench.experiments.identification.method import Method
+from idbench.experiments.identification.request import Request
+from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.recording.audience import Audience
 from idbench.experiments.recording.chart import send_keys
-from idbench.experiments.recording.columns import part, parts, seconds, shown, time_columns
 from idbench.experiments.recording.folder import layer_file
-from idbench.experiments.recording.lanes import Lanes, estimates_table, mask_states, noise_table, short_table
+from idbench.experiments.recording.lanes import Lanes, estimates_table, noise_table, short_table
 from idbench.experiments.recording.layouts import tabs
 from idbench.experiments.recording.residual_charts import ResidualCharts, send_iterations, send_parameters
-from idbench.experiments.recording.stream import Stream
-from idbench.experiments.text import FORM_WIDTHS, GREY, JOINTS, UNITS, Color, joint_colors, kind_colors, model_color
-from idbench.identify import Array, Estimate, JointFit, filtered, measured_state, recursive_least_squares, smoothed_motion
+from idbench.experiments.recording.stream import Stream, part, parts, seconds, shown, time_columns
+from idbench.experiments.text import FORM_WIDTHS, FORMS, GREY, JOINTS, UNITS, Color, joint_colors, kind_colors, model_color
+from idbench.identify import (
+    Array,
+    Estimate,
+    IdentificationError,
+    JointFit,
+    MotionLog,
+    TorqueChannel,
+    filtered,
+    measured_state,
+    recursive_least_squares,
+    smoothed_motion,
+)
+from idbench.identify.rows.rows import is_long
 
 EVERY = 0.5  # Time between the instants of recursive estimates [s]
 WIDE = 7.0  # Width of what a mistake explains, on which the residual is drawn
@@ -50,8 +68,8 @@ class Layer:
             send_rows(self.stream, at, f"{form} {self._called}".strip(), estimate, names, color, width)
             self._columns(at, form, estimate, names)
             self._running(at, form, estimate, color)
-            for fit in estimate.fits.values():
-                self._smoothed(fit)
+            for joint_fit in estimate.fits.values():
+                self._smoothed(joint_fit)
         self._mistake()
         self._truth()
         ResidualCharts(self.stream, self._at, self._fit, self._joints, self._shade).send()
@@ -83,7 +101,8 @@ class Layer:
                 self.stream.curves(path, time_columns(samples[kept] / log.fs, log.fs), curves.T[kept])
         lanes, weight = Lanes(self.stream, log.fs), self._signals.weight
         for joint, of_joint in zip(self._joints, weight, strict=True):
-            lanes.send(f"{self._at}/mask/{joint}", log.t, mask_states(of_joint))
+            used = np.where(of_joint == 0, "masked", np.where(of_joint < 1, "partly", "used"))
+            lanes.send(f"{self._at}/mask/{joint}", log.t, used)
 
     def _smoothed(self, fit: JointFit) -> None:
         """Send the smoothed motion with its band of one sigma, and how far measured positions and their differences are off."""
@@ -174,3 +193,69 @@ def send_rows(  # noqa: PLR0913  # what to send, and how it looks
         stream.curve(f"{at}/measured/{row}", times, found.Y[rows], "measured", GREY, 6.0)
         stream.curve(f"{at}/predicted/{row}", times, estimate.predicted[rows], named, color, width)
         stream.curve(f"{at}/residual/{row}", times, estimate.residual[rows], named, color, width)
+
+
+GROWTH = 1.1
+"""How much longer the log must be before it is identified again: so often that the work stays in proportion to the log."""
+
+ESTIMATOR = "WLS"  # Quick, as it is asked again and again
+
+LABEL = "so-far"
+
+
+class LiveIdentification:
+    """What can be said of a log that grows, sampled at `fs` [Hz], shown in a stream; `joints` are parts of paths."""
+
+    def __init__(
+        self, stream: Stream, robot_model: RobotModel, chain: str, channel: TorqueChannel, fs: float, joints: Sequence[str]
+    ) -> None:
+        self._stream = stream
+        self._channel = channel
+        self._fs = fs
+        self._request = Request(robot_model, method=Method.named(chain, ESTIMATOR), name=LABEL)
+        self._joints = joints
+        self._q = list[Array]()
+        self._tau = list[Array]()
+        self._identified = 0
+        self._shown = dict[str, float]()
+        self._broken = False
+        self.fit: Fit | None = None
+
+    def grow(self, q: Array, tau: Array) -> bool:
+        """Take in positions [rad] and torques [N m], shape (time, joint); return whether the estimates were made anew."""
+        self._q.append(q)
+        self._tau.append(tau)
+        samples = sum(map(len, self._q))
+        if self._broken or samples < GROWTH * self._identified:
+            return False
+        self._identified = samples
+        try:
+            log = MotionLog(self._fs, np.concatenate(self._q), np.concatenate(self._tau), self._channel)
+            self.fit = fit(self._request, Logs((log,)))
+            with self._stream.draft():
+                for form, estimate in self.fit.estimates.items():
+                    self._show(form, estimate, float(log.t[-1]))
+        except IdentificationError:  # too short yet, or not yet excited
+            return False
+        except Exception as error:  # the run is not lost because what is shown of it is
+            self._broken = True
+            sys.stderr.write(
+                f"idbench: nothing more is identified while the robot moves ({reason(error)}; its traceback is in "
+                f"{report(error)}); the work goes on\n"
+            )
+            return False
+        return True
+
+    def _show(self, form: str, estimate: Estimate, now: float) -> None:
+        at, color = f"identify/{LABEL}/{form}", FORMS.get(form, GREY)
+        for name, x, sigma in zip(estimate.names, estimate.X, estimate.standard_errors, strict=True):
+            if form not in self._shown:
+                self._stream.keep(f"{at}/estimate/{part(name)}", rr.Measurements.from_fields(names=[form], colors=[color]))
+            columns = rr.Measurements.columns(values=[x], variances=[sigma**2])
+            self._stream.send(f"{at}/estimate/{part(name)}", [seconds(np.array([now]))], columns)
+        if is_long(estimate.problem.logs):  # of which no rows are kept
+            return
+        names = row_names(form, estimate.rows.kinds, self._joints)
+        last = self._shown.get(form, -np.inf)
+        send_rows(self._stream, at, form, estimate, names, color, FORM_WIDTHS.get(form, 1.5), after=last)
+        self._shown[form] = float(estimate.rows.time[estimate.rows.valid].max(initial=last))

@@ -8,13 +8,11 @@ from idbench.experiments.identification.fit import Fit
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.identification.scenario_run import ScenarioRun
 from idbench.experiments.recording.audience import Audience
-from idbench.experiments.recording.columns import parts
 from idbench.experiments.recording.folder import BASE, INNER, files, known, layer_file, rearranged
-from idbench.experiments.recording.identification_layer import Layer
+from idbench.experiments.recording.identification_layer import Layer, LiveIdentification
 from idbench.experiments.recording.lanes import ROLES, about
-from idbench.experiments.recording.live_layer import LiveIdentification
 from idbench.experiments.recording.motion_layer import Base
-from idbench.experiments.recording.stream import Stream
+from idbench.experiments.recording.stream import Stream, parts
 from idbench.experiments.requests.shared import CHAIN
 from idbench.identify import measured_state
 from idbench.identify.rows.rows import is_long

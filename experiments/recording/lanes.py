@@ -9,8 +9,7 @@ import numpy.typing as npt
 import rerun as rr
 
 from idbench.experiments.identification.fit import Fit
-from idbench.experiments.recording.columns import time_columns
-from idbench.experiments.recording.stream import Stream
+from idbench.experiments.recording.stream import Stream, time_columns
 from idbench.experiments.reports.estimates import LEAST, EstimatesTable, models_apart
 from idbench.experiments.text import MEASURED, PLANNED, STATES, Color, markdown
 from idbench.identify import Array
@@ -101,8 +100,3 @@ def joint_states(qd: Array, slow: float, limited: Array | None, before: float) -
     reverses = np.concatenate([[before], qd[:-1]]) * qd < 0  # a fast joint reverses between two samples
     states = np.where(speed <= STILL * slow, "rests", np.where(reverses | (speed <= slow), "reverses", "moves"))
     return states if limited is None else np.where(limited > 0, "saturated", states)
-
-
-def mask_states(weight: Array) -> npt.NDArray[np.str_]:
-    """True where an instant is used, from its weight, shape (time,)."""
-    return np.where(weight == 0, "masked", np.where(weight < 1, "partly", "used"))

@@ -8,10 +8,9 @@ import rerun as rr
 
 from idbench.experiments.recording.audience import Audience
 from idbench.experiments.recording.chart import send_keys
-from idbench.experiments.recording.columns import POSES, Times, part, parts, poses, seconds, shown, time_columns
 from idbench.experiments.recording.lanes import ROLES, Lanes, joint_states
 from idbench.experiments.recording.layouts import tabs
-from idbench.experiments.recording.stream import Stream
+from idbench.experiments.recording.stream import POSES, Stream, Times, part, parts, poses, seconds, shown, time_columns
 from idbench.experiments.text import GREY, WIDTHS, Color, joint_colors, kind_colors
 from idbench.identify import Array, MotionLog
 from idbench.identify.signals.masks import slow_speed
@@ -21,7 +20,7 @@ from idbench.sim.robot.robot import Robot
 from idbench.sim.robot.scene import Mover, SceneShape, shapes
 
 if TYPE_CHECKING:
-    from idbench.experiments.recording.live_layer import LiveIdentification
+    from idbench.experiments.recording.identification_layer import LiveIdentification
 
 
 class Arm:

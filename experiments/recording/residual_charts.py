@@ -10,9 +10,8 @@ import numpy.typing as npt
 from idbench.experiments.identification.fit import Fit
 from idbench.experiments.judgement.warnings import WEAK
 from idbench.experiments.recording.chart import MAX_ROWS, NARROW, SQUARE, SYMBOLS, Chart, in_charts
-from idbench.experiments.recording.columns import part
 from idbench.experiments.recording.scales import Linear, Signed, decades, linear, listed, named
-from idbench.experiments.recording.stream import Stream
+from idbench.experiments.recording.stream import Stream, part
 from idbench.experiments.reports.friction_curves import (
     FRICTIONS,
     FrictionCurves,

@@ -5,11 +5,10 @@ from collections.abc import Mapping
 import numpy as np
 
 from idbench.experiments.recording.audience import Audience
-from idbench.experiments.recording.columns import part, seconds
 from idbench.experiments.recording.folder import BASE
 from idbench.experiments.recording.identification_recording import recording_id
 from idbench.experiments.recording.motion_layer import Base
-from idbench.experiments.recording.stream import Stream
+from idbench.experiments.recording.stream import Stream, part, seconds
 from idbench.experiments.text import FORMS, GREY
 from idbench.identify import Array
 from idbench.identify.files.servo_log import ServoColumns

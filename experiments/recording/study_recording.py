@@ -12,17 +12,15 @@ import rerun as rr
 
 from idbench.experiments.recording.audience import Audience
 from idbench.experiments.recording.chart import NARROW, SYMBOLS, Chart, Symbol
-from idbench.experiments.recording.columns import part
 from idbench.experiments.recording.folder import BASE
 from idbench.experiments.recording.layouts import tabs
 from idbench.experiments.recording.scales import Words, decades, linear, named
-from idbench.experiments.recording.stream import Stream
-from idbench.experiments.study.answer import in_words, short, where
+from idbench.experiments.recording.stream import Stream, part
+from idbench.experiments.study.answer import command, in_words, short, where, worst_runs
 from idbench.experiments.study.axis import Axis
 from idbench.experiments.study.ratios import study_answer
 from idbench.experiments.study.statistics import MIN_ERROR, Cell
 from idbench.experiments.study.study import Study
-from idbench.experiments.study.worst_runs import command, worst_runs
 from idbench.experiments.text import FORMS, GREY, JOINTS, Color, lighter
 from idbench.identify import Array
 

@@ -9,8 +9,8 @@ from rich.console import Console
 from rich.text import Text
 
 from idbench.experiments.excite.excited import BINDING, Excited
+from idbench.experiments.excite.job import MotionSequence
 from idbench.experiments.excite.limit_use import FS
-from idbench.experiments.excite.sequence import MotionSequence
 from idbench.experiments.reports.drawn import svg
 from idbench.experiments.reports.figures import rendered
 from idbench.experiments.text import JOINTS, WORTHLESS, new_table, number, percentage, print_titled

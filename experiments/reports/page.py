@@ -11,11 +11,10 @@ from typing import Any
 import numpy as np
 
 from idbench.experiments.identification.fit import Fit
-from idbench.experiments.judgement.conclusion import Conclusion
 from idbench.experiments.judgement.held_out import HeldOut
-from idbench.experiments.judgement.judgement import Judgement, Unjudged
+from idbench.experiments.judgement.judgement import Conclusion, Judgement, Unjudged
 from idbench.experiments.judgement.warnings import WEAK, doubtful
-from idbench.experiments.reports.estimates import EstimatesTable, all_units
+from idbench.experiments.reports.estimates import EstimatesTable, all_units, correlated, error_shares
 from idbench.experiments.reports.figures import (
     causes_figure,
     color_of,
@@ -25,7 +24,6 @@ from idbench.experiments.reports.figures import (
     spectra_figure,
     torques_figure,
 )
-from idbench.experiments.reports.uncertainty import correlated, error_shares
 from idbench.experiments.results.attempts import Attempts
 from idbench.experiments.text import SIGMAS, percent_reach, percentage, relative
 from idbench.identify.arrays import TINY

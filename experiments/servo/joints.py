@@ -11,11 +11,10 @@ from idbench.identify import Array, IdentificationError
 from idbench.identify.files.servo_log import ServoColumns
 from idbench.identify.servo import JointLoad, Servo, ServoFit, ServoRun, identify_again
 from idbench.identify.servo.choice import ServoFrictionChoice
-from idbench.identify.servo.identification import APART, OffsetJoint, per_offset, together
+from idbench.identify.servo.identification import APART, OffsetJoint, per_offset, tied, together
 from idbench.identify.servo.rows import corrected, smoothed
 from idbench.identify.servo.run import without_spikes
 from idbench.identify.servo.stages import searched_runs
-from idbench.identify.servo.tied import tied
 from idbench.identify.telling import stage
 from idbench.sim.robot.inverse_dynamics import inverse_dynamics, mass_matrices
 from idbench.sim.robot.robot import Robot
@@ -166,7 +165,8 @@ class Joints:
         change = np.inf
         for _ in range(SWEEPS):
             moving = self._moving(fits, runs)
-            apart = _apart(before, moving) if before else change
+            each = zip(before, moving, strict=True) if before else ()  # largest mean difference over joints and logs [rad]
+            apart = max((float(np.abs(a[j].q - b[j].q).mean()) for a, b in each for j in a), default=change)
             if apart > change:  # joints that saturate may push each other apart
                 break
             runs = self._loaded(moving)
@@ -269,11 +269,6 @@ class Joints:
         measured = columns.t, columns.q[:, j], columns.command[:, j]
         enabled = None if on is None else on > 0.5
         return ServoRun(*measured, load, log.servos[j], enabled, voltage, forward, (low, high), name=name)
-
-
-def _apart(one: Sequence[Mapping[int, Moving]], other: Sequence[Mapping[int, Moving]]) -> float:
-    """Largest mean difference of motions over joints and logs [rad]."""
-    return max(float(np.abs(a[j].q - b[j].q).mean()) for a, b in zip(one, other, strict=True) for j in a)
 
 
 def _attempt(identify: Callable[[], Identified]) -> tuple[Identified | str, ServoFit | None]:

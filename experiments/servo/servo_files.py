@@ -1,14 +1,20 @@
-"""Servos as files: a function in Python, and the robot's MJCF, measured in plain MuJoCo."""
+"""Servos as files: a function in Python, and the robot's MJCF, measured in plain MuJoCo; servos that ship as devices."""
 
+import json
 from collections.abc import Iterable, Mapping, Sequence
+from functools import cache
 from importlib.metadata import version
 from importlib.resources import files
 from pathlib import Path
 from pprint import pformat
+from typing import Any
 
 import numpy as np
 
+from idbench.experiments.errors import ExperimentError
 from idbench.experiments.servo.identification import Servos
+from idbench.identify.files.servo_file import ServoFile
+from idbench.identify.plugins import did_you_mean
 from idbench.identify.servo import SERVO_FRICTIONS, Servo, ServoFit
 from idbench.identify.servo.identification import with_friction
 from idbench.identify.servo.parameters import SERVO_PARAMETERS, ServoLaw
@@ -18,18 +24,16 @@ from idbench.sim.robot.servos import Commands, ServoValues, replay, with_servos
 def servo_function(robot: str, fits: Mapping[str, tuple[Servo, ServoFit]], logs: Sequence[str]) -> str:
     """Python file of what is known of each joint's servo, and what was found."""
     text = files("idbench.experiments.exports").joinpath("servo.py.txt").read_text(encoding="utf-8")
-    every = {joint: _parameters(servo, fit) for joint, (servo, fit) in fits.items()}
+    every = dict[str, dict[str, float]]()
+    for joint, (servo, fit) in fits.items():
+        known = {name: getattr(servo, name) for name in ("kd", "supply", "limit", "counts", "speed_limit")}
+        law = {name: float(x) for name, x in ServoLaw(**fit.p)._asdict().items()}
+        every[joint] = {"gain": servo.slope, **known, **{name: law[name] for name in SERVO_PARAMETERS if name != "backlash"}}
     table = pformat(every, width=110, sort_dicts=False).replace("inf", 'float("inf")')
     words = {"name": robot, "version": version("idbench"), "logs": ", ".join(logs)}
     for mark, word in {**words, "servos": table}.items():
         text = text.replace(f"{{{mark}}}", word)
     return text
-
-
-def _parameters(servo: Servo, fit: ServoFit) -> dict[str, float]:
-    known = {name: getattr(servo, name) for name in ("kd", "supply", "limit", "counts", "speed_limit")}
-    law = ServoLaw(**fit.p)._asdict()
-    return {"gain": servo.slope, **known, **{name: float(law[name]) for name in SERVO_PARAMETERS if name != "backlash"}}
 
 
 EXPRESSIBLE = ("a", "b", "Ia", "Fs", "Fv", "offset", "lag", "lead", "delay", "rate", "backlash")
@@ -95,3 +99,36 @@ def in_mujoco(
     q = replay(servos.known.robot(path.name) or servos.robot, text, folder, sent, columns.q[0] + offset)
     error = np.abs(q - columns.q - offset).mean(axis=0)
     return {joint: float(error[j]) for joint, j in zip(fits, places, strict=True)}
+
+
+BENCH = "pendulum"  # Robot to whose joint a servo is written where none is named
+
+
+@cache
+def devices() -> dict[str, dict[str, Any]]:
+    """Devices that ship, by their names."""
+    folder = files("idbench.experiments.servo").joinpath("devices")
+    found = [json.loads(path.read_text(encoding="utf-8")) for path in folder.iterdir() if path.name.endswith(".json")]
+    return {device["name"]: device for device in sorted(found, key=lambda device: str(device["name"]))}
+
+
+def device_of(name: str) -> dict[str, Any]:
+    """A device; raise ExperimentError if none has this name."""
+    every = devices()
+    if name not in every:
+        raise ExperimentError(f"there is no device {name!r}{did_you_mean(name, every)}; there are {', '.join(every)}")
+    return every[name]
+
+
+def servo_toml_of(device: Mapping[str, Any]) -> str:
+    """A servo.toml of a device, and the words that hold its parameters in a fit."""
+    known = "\n".join(f"{key} = {json.dumps(x)}" for key, x in device["known"].items())
+    held = " ".join(f"{letter}={of['value']:.4g}" for letter, of in device["parameters"].items() if letter in ("a", "b"))
+    return f"# {device['name']}: {device['source']}\n# a joint without a known load: --hold {held}\n{known}\nkp = 16  # yours\n"
+
+
+def mjcf_of_device(device: Mapping[str, Any], robot: str, joints: Sequence[int], kp: float, folder: Path) -> str:
+    """A robot's MJCF with the device at joints, by their numbers, and a gain of its firmware."""
+    p = {letter: of["value"] for letter, of in device["parameters"].items()}
+    values = values_of(p, ServoFile({**device["known"], "kp": kp}, {}, {}).servo("", ""))
+    return with_servos(robot, dict.fromkeys(joints, values), folder)

@@ -68,7 +68,7 @@ def _again(
     tell: Callable[[str], None], folder: Path | None, index: int | None, method: int | None
 ) -> tuple[Scenario, Combination]:
     """Return the scenario of a run of a study, which is reproduced, and how it is identified."""
-    from idbench.experiments.study.run_study import compare_again
+    from idbench.experiments.study.job import compare_again
     from idbench.experiments.study.store import Store
 
     if folder is None or index is None:

@@ -7,8 +7,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from idbench.experiments.study.answer import answer, combination, failures, smallest_named
-from idbench.experiments.study.comparison import ln_typical
-from idbench.experiments.study.statistics import CONFIDENCE, Cell
+from idbench.experiments.study.statistics import CONFIDENCE, Cell, ln_typical
 from idbench.experiments.study.study import SEVERITY, Study
 from idbench.experiments.text import new_table
 from idbench.identify.models import THREE

@@ -15,7 +15,6 @@ from idbench.experiments.study.statistics import BOUNDS
 from idbench.experiments.study.study import Study
 from idbench.identify import (
     Array,
-    Chain,
     Estimate,
     ExplicitModel,
     IdentificationError,
@@ -194,7 +193,9 @@ def _outcomes(
     study: Study, combination: Combination, simulated: Run, logs: Sequence[MotionLog], simulation: Simulation
 ) -> dict[str, Estimate | IdentificationError]:
     """What each model gives of some runs."""
-    found, chain = dict[str, Estimate | IdentificationError](), _trimmed(study, combination, simulated)
+    found, chain = dict[str, Estimate | IdentificationError](), combination.method.chain
+    if study.rows == "equal" and chain.trim is None:  # with the longest margin of all models
+        chain = replace(chain, trim=max(chain.of_model(m).margin(simulated.log) for m in study.created_models.values()))
     for count in dict.fromkeys(map(study.logs_of, study.models)):
         models = {name: model for name, model in study.created_models.items() if study.logs_of(name) == count}
         basis = study.subjects[combination.friction].basis
@@ -220,16 +221,6 @@ def _alike(study: Study, combination: Combination, simulated: Run, runs: int) ->
         logs = (simulated.log.run((k * runs + i,)) for k in range(study.most_logs))
         groups[tuple(map(combination.method.chain.suited_prefilter, logs))].append(i)
     return list(groups.values())
-
-
-def _trimmed(study: Study, combination: Combination, simulated: Run) -> Chain:
-    """Return the chain of a method; if models are to have equal numbers of rows, with the longest margin of all of them."""
-    if study.rows == "own" or combination.method.chain.trim is not None:
-        return combination.method.chain
-    models = study.created_models.values()
-    return replace(
-        combination.method.chain, trim=max(combination.method.chain.of_model(m).margin(simulated.log) for m in models)
-    )
 
 
 def _simulation(

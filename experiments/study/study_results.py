@@ -15,10 +15,20 @@ from idbench.experiments.reports.figures import rendered
 from idbench.experiments.results.attempts import Attempts
 from idbench.experiments.results.folder import ResultsFolder
 from idbench.experiments.results.writing import finite, write_summary
-from idbench.experiments.study.answer import grouped, headline, in_words, method, percent, settings_of, short, where
+from idbench.experiments.study.answer import (
+    command,
+    grouped,
+    headline,
+    in_words,
+    method,
+    percent,
+    settings_of,
+    short,
+    where,
+    worst_runs,
+)
 from idbench.experiments.study.axis import FRICTION
 from idbench.experiments.study.cluster import versions
-from idbench.experiments.study.comparison import differences
 from idbench.experiments.study.figures import (
     bars_figure,
     cost_figure,
@@ -28,10 +38,9 @@ from idbench.experiments.study.figures import (
     typical_figure,
 )
 from idbench.experiments.study.ratios import compares_models, interval, pair_of, ratios, ratios_table, study_answer
-from idbench.experiments.study.statistics import BOUNDS, NAMED, Cell, cells
+from idbench.experiments.study.statistics import BOUNDS, NAMED, Cell, cells, differences
 from idbench.experiments.study.store import Store, arrays
 from idbench.experiments.study.study import Study
-from idbench.experiments.study.worst_runs import command, worst_runs
 from idbench.experiments.text import new_table, print_table
 from idbench.experiments.text import percent as signed
 

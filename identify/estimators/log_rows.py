@@ -192,10 +192,13 @@ Piece = tuple[Chain, MotionLog, tuple[int, int]]
 
 
 def pieces(chain: Chain, logs: Sequence[MotionLog]) -> list[Piece]:
-    """Return every piece of logs, each with the chain whose mask is suited to the whole log."""
-    suited = [_suited(chain, log) for log in logs]
-    each = zip(suited, logs, strict=True)
-    return [(own, log, piece) for own, log in each for piece in own.pieces(log)]
+    """Return every piece of logs, each with the chain whose prefilter and mask are suited to the whole log."""
+    found = list[Piece]()
+    for log in logs:
+        signals = chain.signals(log)  # of which nothing but what suits the log is kept
+        own = replace(chain, prefilter=signals.prefilter, mask=chain.mask.suited(signals.state.qd))
+        found += [(own, log, piece) for piece in own.pieces(log)]
+    return found
 
 
 def bias_counts(parts: Sequence[LogRows], names: tuple[str, ...], share: float) -> bool:
@@ -210,9 +213,3 @@ def bias_counts(parts: Sequence[LogRows], names: tuple[str, ...], share: float) 
     known = np.array(plain.determined & better.determined)
     sigma = np.sqrt(np.diagonal(better.inverse(known)) * share)
     return not (np.abs(plain.solution(known) - better.solution(known)) < MOVED * sigma).all()
-
-
-def _suited(chain: Chain, log: MotionLog) -> Chain:
-    """The chain with prefilter and mask that suit a whole log, without anything else that its signals keep."""
-    signals = chain.signals(log)
-    return replace(chain, prefilter=signals.prefilter, mask=chain.mask.suited(signals.state.qd))

@@ -129,7 +129,9 @@ def showing_moves(tree: KinematicTree, grouping: BaseParameters, names: Sequence
 
     @cache
     def shown(joints: tuple[int, ...]) -> Array:
-        return _shown(basis, _only(states, joints))
+        moving = np.isin(np.arange(tree.n), joints)[:, None]  # the others stand where they are first
+        q = np.where(moving, states[0], states[0, :, :1])
+        return _shown(basis, np.stack([q, states[1] * moving, states[2] * moving]))
 
     every = tuple(range(tree.n))
     moves = [move for count in range(1, min(MOST_JOINTS, tree.n) + 1) for move in combinations(every, count)]
@@ -160,13 +162,6 @@ def brisk_shares(tree: KinematicTree, basis: Basis, X: Array, sigma: Array) -> A
     torque = np.sqrt(np.mean(np.einsum("jpt,p->jt", W, X) ** 2, axis=-1))
     parts = np.sqrt(np.mean(W**2, axis=-1)) * sigma
     return np.max(parts / np.maximum(torque, TINY)[:, None], axis=0)
-
-
-def _only(states: Array, joints: Sequence[int]) -> Array:
-    """Return the states with some joints moving and the others standing where they are first."""
-    moving = np.zeros((states.shape[1], 1), dtype=bool)
-    moving[list(joints)] = True
-    return np.stack([np.where(moving, states[0], states[0, :, :1]), states[1] * moving, states[2] * moving])
 
 
 def _shown(basis: Basis, states: Array) -> Array:

@@ -7,7 +7,6 @@ from functools import cached_property
 import numpy as np
 
 from idbench.identify.arrays import combined
-from idbench.identify.basis.basis import Basis
 from idbench.identify.basis.block import FRICTION, AbstractBlock
 from idbench.identify.basis.friction.laws import TanhFriction
 from idbench.identify.basis.friction.shape import ShapedFriction
@@ -190,20 +189,17 @@ class _Choice:
         """Return the comparison of further laws, beside these with their own shapes, without some parameters."""
         key = tuple(laws), tuple(gone)
         if key not in self._settled:
-            self._settled[key] = settled(self.problem.with_basis(self._basis(laws, gone)))
+            basis = self.problem.basis.without(*gone) if gone else self.problem.basis
+            for name in dict.fromkeys(name for own in laws for name in own):
+                joints = tuple(j for j, own in enumerate(laws) if name in own)
+                basis = basis + OfJoints(self.candidates[name], joints)
+            self._settled[key] = settled(self.problem.with_basis(basis))
         return HeldOutProducts.of(self._settled[key], candidates)
 
     @cached_property
     def _settled(self) -> dict[tuple[tuple[tuple[str, ...], ...], tuple[str, ...]], Problem]:
         """Problems by the laws of each joint and what they are without: some are asked for several times."""
         return {}
-
-    def _basis(self, laws: Sequence[tuple[str, ...]], gone: Sequence[str]) -> Basis:
-        basis = self.problem.basis.without(*gone) if gone else self.problem.basis
-        for name in dict.fromkeys(name for own in laws for name in own):
-            joints = tuple(j for j, own in enumerate(laws) if name in own)
-            basis = basis + OfJoints(self.candidates[name], joints)
-        return basis
 
 
 def falls(problem: Problem, j: int) -> bool:

@@ -132,7 +132,7 @@ class _Search:
         W = np.concatenate([self._W, *(self._padded(c.white) for c in taken)], axis=1)
         Q = np.linalg.qr(W)[0]
         e = self._Y - Q @ (Q.T @ self._Y)
-        own = e[: len(e) - self._known]
+        own = e[: len(e) - len(self._known)]
         there = {(c.key, c.mistake.setting) for c in taken}
         looked_for = (*self.rows.pushed(own), *self.rows.shaken(own), *self.rows.rippled(own))
         candidates = [*every, *(c for c in looked_for if (c.key, c.mistake.setting) not in there)]
@@ -171,29 +171,23 @@ class _Search:
         return TorqueGains.of(self.problem)
 
     @cached_property
-    def _known(self) -> int:
-        """Rows of what is known before."""
+    def _known(self) -> Array:
+        """Rows [W Y] of what is known before, shape (m, p + 1)."""
         prior = self.problem.start.factor.prior
-        return 0 if prior is None else len(prior)
+        return np.zeros((0, len(self.problem.names) + 1)) if prior is None else prior
 
     @cached_property
     def _W(self) -> Array:
         """Whitened W, and below what is known before, shape (r + m, p)."""
-        prior = self.problem.start.factor.prior
-        return np.concatenate(
-            [part.whitening.whiten(part.unbiased.W) for part in self.problem.parts] + ([] if prior is None else [prior[:, :-1]])
-        )
+        return np.concatenate([*(part.whitening.whiten(part.unbiased.W) for part in self.problem.parts), self._known[:, :-1]])
 
     @cached_property
     def _Y(self) -> Array:
-        prior = self.problem.start.factor.prior
-        return np.concatenate(
-            [part.whitening.whiten(part.rows.Y[:, None])[:, 0] for part in self.problem.parts]
-            + ([] if prior is None else [prior[:, -1]])
-        )
+        each = ((part.whitening, part.rows.Y[:, None]) for part in self.problem.parts)
+        return np.concatenate([*(white.whiten(Y)[:, 0] for white, Y in each), self._known[:, -1]])
 
     def _padded(self, columns: Array) -> Array:
-        return np.concatenate([columns, np.zeros((self._known, columns.shape[1]))])
+        return np.concatenate([columns, np.zeros((len(self._known), columns.shape[1]))])
 
     def _tested(self, candidate: Candidate, Q: Array, e: Array, *, of_all: bool) -> _Tested | None:
         """Return a test; None where parameters leave nothing. What white residuals excuse has chi2 = 0, if not `of_all`."""
@@ -208,8 +202,9 @@ class _Search:
         U, s, axes = np.linalg.svd(left[:, shown] / size[shown], full_matrices=False)
         some = s**2 > APART * s[0] ** 2
         U, turn = U[:, some], (axes[some].T / s[some]) / size[shown][:, None]
-        b, own = U.T @ e, len(e) - self._known
-        gain, rest = self._gain(e[:own], U[:own], b), e - U @ b
+        b, own = U.T @ e, len(e) - len(self._known)
+        rest = e - U @ b
+        gain = self._unlikely(e[:own]) - self._unlikely(e[:own] - U[:own] @ b) - len(b) * np.log(own)
         if not of_all and not self._may_matter(e[:own], b):
             return _Tested(candidate, U[:own], np.zeros(0), np.zeros(0), U[:own] @ b, 0.0, gain, of_all)
         parts = self.problem.parts
@@ -221,9 +216,6 @@ class _Search:
         if (candidate.mistake.positive and sizes.min() < 0) or np.abs(sizes).max() > self.rows.most(candidate):
             return None
         return _Tested(candidate, U[:own], sizes, sigma, U[:own] @ b, chi2, gain, of_all)
-
-    def _gain(self, e: Array, U: Array, b: Array) -> float:
-        return self._unlikely(e) - self._unlikely(e - U @ b) - len(b) * np.log(len(e))
 
     def _may_matter(self, e: Array, b: Array) -> bool:
         """True if a mistake may be significant: correlated residuals scatter its size more than white ones."""
@@ -247,6 +239,7 @@ class _Search:
                 others.append(key)
         if self._ways(best):
             others.append((GAIN.cause, 1 - (candidate.joint or 0)))
+        absorbed = np.linalg.lstsq(self._W, self._padded((candidate.white @ best.size)[:, None]))[0][:, 0]  # by parameters
         return Suspect(
             candidate.mistake.cause,
             candidate.mistake.of,
@@ -263,7 +256,7 @@ class _Search:
             0.0,
             *self.rows.place(candidate.instant),
             gains=self._ways(best),
-            explained=candidate.plain @ best.size - self._plain @ self._absorbed(candidate.white @ best.size),
+            explained=candidate.plain @ best.size - self._plain @ absorbed,
         )
 
     def _ways(self, best: _Tested) -> tuple[tuple[float, ...], ...]:
@@ -282,10 +275,6 @@ class _Search:
         if (mistake.cause, mistake.of) == ("delay", "torque") and joint is not None:
             return (torque_lateness(self.problem, joint, float(best.size[0])),)
         return tuple(best.size.tolist())
-
-    def _absorbed(self, white: Array) -> Array:
-        """Return the parameters that explain as much of a column as they can, shape (p,)."""
-        return np.asarray(np.linalg.lstsq(self._W, self._padded(white[:, None]))[0][:, 0])
 
     @cached_property
     def _plain(self) -> Array:

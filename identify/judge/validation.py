@@ -11,8 +11,8 @@ from idbench.identify.arrays import TINY, Array
 from idbench.identify.data.motion_log import MotionLog
 from idbench.identify.errors import LogError
 from idbench.identify.estimators.problem import Problem
-from idbench.identify.judge.judged_rows import as_judged, row_noise, shares
 from idbench.identify.judge.residuals import instants
+from idbench.identify.judge.used_rows import as_judged, row_noise, shares
 from idbench.identify.models import ExplicitModel
 from idbench.identify.noise.propagation import torque_paths
 from idbench.identify.rows.operators import AbstractOperator

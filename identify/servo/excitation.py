@@ -56,7 +56,8 @@ class Excitation:
             raise IdentificationError(
                 f"{wrong[0].name}: {spans}: is the command in degrees or counts? State its unit: --units command=deg"
             )
-        if all(_saturated(run) for run in runs):
+        duties = (run.servo.slope * np.abs(run.command - run.clean)[run.enabled] >= run.servo.limit for run in runs)
+        if all(duty.size and np.mean(duty) > 0.98 for duty in duties):
             raise ExcitationError(
                 f"{runs[0].name}: the duty is at its limit almost all the time, where the command has no effect: command "
                 "slower motions, or smaller steps"
@@ -84,8 +85,3 @@ class Excitation:
         """Typical sizes, by what `ServoParameter.of` names."""
         rates = {"speed": self.speed, "torque per speed": self.torque / self.speed}
         return {"torque": self.torque, "angle": self.step, "time": self.T, "1": 1.0, **rates}
-
-
-def _saturated(run: ServoRun) -> bool:
-    duty = run.servo.slope * np.abs(run.command - run.clean)[run.enabled]
-    return bool(duty.size) and bool(np.mean(duty >= run.servo.limit) > 0.98)

@@ -137,9 +137,3 @@ def parameters_of(friction: str, more: Sequence[str] = ()) -> tuple[str, ...]:
         named = [name for name in SERVO_PARAMETERS if name in (*known, *FURTHER)]
         raise SettingError(f"a servo with friction {friction} has no parameter {wrong[0]!r}; known: {', '.join(named)}")
     return tuple(name for name in SERVO_PARAMETERS if name in (*known, *more))
-
-
-def step_of(name: str, value: float, scales: Mapping[str, float]) -> float:
-    """Step of finite differences of a parameter."""
-    parameter = SERVO_PARAMETERS[name]
-    return parameter.relative * abs(value) if parameter.relative else parameter.share * scales[parameter.of]

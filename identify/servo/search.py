@@ -15,7 +15,7 @@ from scipy.special import ndtri
 from idbench.identify.arrays import Array
 from idbench.identify.nuisances import Nuisances
 from idbench.identify.servo.closed_loop import STATES, ServoLoop
-from idbench.identify.servo.parameters import SERVO_PARAMETERS, step_of
+from idbench.identify.servo.parameters import SERVO_PARAMETERS
 
 DAMPINGS = 10.0 ** np.arange(-2.0, 4.0)  # Marquardt's parameter, as multiples of the last one that helped
 SAMPLES = 12  # Samples a round, in pairs
@@ -153,7 +153,8 @@ class ServoSearch:
         self, start: Mapping[str, float], x: Array, ahead: Array, width: float
     ) -> tuple[Array, Array, Array, Array, Nuisances]:
         """Points about x, their costs, sensitivity and residual at x, and other beginnings as unknowns."""
-        h = width * np.array([step_of(name, value, self.scales) for name, value in zip(self.free, x, strict=True)])
+        each = ((SERVO_PARAMETERS[name], value) for name, value in zip(self.free, x, strict=True))
+        h = width * np.array([p.relative * abs(value) if p.relative else p.share * self.scales[p.of] for p, value in each])
         upper = x + np.diag(h)
         lower = np.maximum(x - np.diag(h), self.loop.limits(self.free)[0])
         n = len(x)

@@ -104,8 +104,10 @@ class Stages:
         more = (*more, *self._usual)
         first = start_parameters(friction, p, self._excitation.speed) | dict.fromkeys(more, 0.0)
         begin = {**first, **p, **self._held}
-        if "backlash" in more and "backlash" not in {**p, **self._held}:
-            begin["backlash"] = _play(self._coarse, begin)
+        if "backlash" in more and "backlash" not in {**p, **self._held}:  # without any, its sensitivity is none
+            loop, tried = self._coarse, self._coarse.runs[0].still * PLAYS
+            q = loop.simulate({name: np.full(len(tried), x) for name, x in begin.items()} | {"backlash": tried})
+            begin["backlash"] = float(tried[int((np.abs(loop.q - q) * loop.kept).mean(axis=(1, 2)).argmin())])
         known = {*parameters_of(friction, more), *(name for name in self._held if name in FURTHER)}
         begin = {name: x for name, x in begin.items() if name in known}  # what is held may be of a further law
         free = self._free(friction, more, begin)
@@ -269,13 +271,6 @@ def _best_start(runs: Sequence[ServoRun], held: Mapping[str, float], excitation:
     q = loop.simulate({name: np.array([p[name] for p in starts]) for name in starts[0]})
     best = int(ServoSearch(loop, (), excitation.scales, excitation.range / 10).cost(q).argmin())
     return dict(starts[best]), float(np.abs(loop.q - q[best])[loop.kept].mean()) / excitation.range
-
-
-def _play(loop: ServoLoop, begin: dict[str, float]) -> float:
-    """Backlash of some that fits best: where there is none to begin with, its sensitivity is none."""
-    tried = loop.runs[0].still * PLAYS
-    r = np.abs(loop.q - loop.simulate({name: np.full(len(tried), x) for name, x in begin.items()} | {"backlash": tried}))
-    return float(tried[int((r * loop.kept).mean(axis=(1, 2)).argmin())])
 
 
 def _evenly(runs: Sequence[ServoRun]) -> list[ServoRun]:

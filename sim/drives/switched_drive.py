@@ -8,8 +8,7 @@ from pydantic import Field
 from idbench.identify.compiled import pointer
 from idbench.sim.drives.averaged_drive import limits
 from idbench.sim.drives.drive import AbstractAmplifier, AbstractCompiledAmplifier, AbstractDrive, BetweenEdges, Electric, Trace
-from idbench.sim.drives.pwm import Modulation, Modulator, pieces
-from idbench.sim.drives.winding import Winding, pass_period, straight, stretches
+from idbench.sim.drives.pwm import Modulation, Modulator, Winding, pass_period, pieces, straight, stretches
 from idbench.sim.errors import ScenarioError
 from idbench.sim.part import Addresses
 from idbench.sim.robot.motors import Array, Motors

@@ -68,7 +68,9 @@ def _described(path: Path, stated: Mapping[str, Any]) -> tuple[mujoco.MjSpec, li
         _require_known(path, f"joint {name}", joint, OF_JOINTS + OF_CONVENTION[convention])
         values = _Values(path, name, joint, scale)
         if convention == KHALIL:
-            parent = _parent(path, joint, bodies, last)
+            if (of := joint.get("parent")) is not None and of not in bodies:
+                raise RobotError(f"{path}: parent {of!r} is no joint before it; known: {', '.join(bodies) or 'none'}")
+            parent = last if of is None else bodies[of]
             place, distal = values.khalil(), (np.zeros(3), np.eye(3))
         else:
             parent, place = last, distal
@@ -128,14 +130,6 @@ class _Values:
         """Pose of the next frame in that of this joint."""
         turned = _turn("z", self.angle("theta"))
         return np.array([0, 0, self.length("d")]) + turned @ [self.length("a"), 0, 0], turned @ _turn("x", self.angle("alpha"))
-
-
-def _parent(path: Path, joint: Mapping[str, Any], bodies: Mapping[str, mujoco.MjsBody], last: mujoco.MjsBody) -> mujoco.MjsBody:
-    if (name := joint.get("parent")) is None:
-        return last
-    if name not in bodies:
-        raise RobotError(f"{path}: parent {name!r} is no joint before it; known: {', '.join(bodies) or 'none'}")
-    return bodies[name]
 
 
 def _body(parent: mujoco.MjsBody, name: str, place: tuple[Array, Array], values: _Values) -> mujoco.MjsBody:

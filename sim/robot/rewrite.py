@@ -15,8 +15,7 @@ from idbench.identify.basis.block import named
 from idbench.sim.errors import RobotError
 from idbench.sim.robot.dh import TABLE
 from idbench.sim.robot.motors import Array
-from idbench.sim.robot.mounting import PLAIN, Mounting
-from idbench.sim.robot.opened import drop_ties, hold_bases
+from idbench.sim.robot.mounting import PLAIN, Mounting, drop_ties, hold_bases
 from idbench.sim.robot.payload import without_missing_meshes
 from idbench.sim.robot.placed import Body
 from idbench.sim.robot.robot import Robot

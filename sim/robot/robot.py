@@ -20,7 +20,7 @@ from idbench.identify.plugins import did_you_mean
 from idbench.sim.errors import BenchError, RobotError
 from idbench.sim.robot.dh import TABLE, from_table
 from idbench.sim.robot.motors import Array, Motors
-from idbench.sim.robot.opened import drop_ties, hold_bases
+from idbench.sim.robot.mounting import drop_ties, hold_bases
 from idbench.sim.robot.payload import without_missing_meshes
 from idbench.sim.robot.urdf import SMALL, from_urdf
 
@@ -108,7 +108,10 @@ class Robot:
         try:
             spec, notes = _read(path)
             spec.compiler.fusestatic = False  # bodies stay those of the file
-            _name_joints(spec)
+            taken = {joint.name for joint in spec.joints}
+            for number, joint in enumerate(spec.joints, start=1):
+                if not joint.name:  # it gets one that can be said
+                    joint.name = next(free for i in count() if (free := f"joint{number}" + "_" * i) not in taken)
             return spec, tuple(notes)
         except RobotError as error:
             raise RobotError(f"robot {name!r}: {error}") from None
@@ -222,16 +225,11 @@ def _read(path: Path) -> tuple[mujoco.MjSpec, list[str]]:
     if "<robot" in text:
         return from_urdf(text)
     if "<mujocoinclude" in text:
-        raise RobotError(_of_a_part(path))
+        others = [other for other in sorted(path.parent.glob("*.xml")) if other != path and _includes(other, path.name)]
+        named = f": give {' or '.join(map(str, others))}" if others else ", which is the one to give"
+        raise RobotError(f"this file is a part that another includes{named}")
     spec = mujoco.MjSpec.from_file(str(path))
     return spec, without_missing_meshes(spec, path.parent)
-
-
-def _of_a_part(path: Path) -> str:
-    """Hint which file to give instead of one that others include."""
-    others = [other for other in sorted(path.parent.glob("*.xml")) if other != path and _includes(other, path.name)]
-    named = f": give {' or '.join(map(str, others))}" if others else ", which is the one to give"
-    return f"this file is a part that another includes{named}"
 
 
 def _includes(other: Path, name: str) -> bool:
@@ -245,14 +243,6 @@ def _smaller_side(limits: Array) -> float:
     """Distance of the nearer end of a range from 0; of a range that lies to one side of it, of the farther one."""
     low, high = (float(x) for x in limits)
     return min(-low, high) if low < 0 < high else max(abs(low), abs(high))
-
-
-def _name_joints(spec: mujoco.MjSpec) -> None:
-    """Give every joint without a name one that can be said, by its number."""
-    taken = {joint.name for joint in spec.joints}
-    for number, joint in enumerate(spec.joints, start=1):
-        if not joint.name:
-            joint.name = next(name for i in count() if (name := f"joint{number}" + "_" * i) not in taken)
 
 
 def _way_out(reason: str) -> str:

@@ -167,24 +167,16 @@ def _placement(model: mujoco.MjModel, body: int) -> tuple[int, Array, Array]:
 
 
 def _inertial(model: mujoco.MjModel, link: int) -> tuple[Array, Array, float]:
-    """Return inertia matrix and first moments about the origin of a link's frame, and its mass."""
+    """Return inertia matrix and first moments about the origin of a link's frame, and its mass, with what is welded to it."""
     inertia, first, mass = np.zeros((3, 3)), np.zeros(3), 0.0
-    for body, position, rotation in _welded(model, link):
+    for body in (link, *(body for body in range(link + 1, model.nbody) if model.body_weldid[body] == link)):
+        position, rotation = (np.zeros(3), np.eye(3)) if body == link else _placement(model, body)[1:]
         m, c = float(model.body_mass[body]), position + rotation @ model.body_ipos[body]
         axes = rotation @ _rotation(model.body_iquat[body])
         inertia += axes @ np.diag(model.body_inertia[body]) @ axes.T + m * (c @ c * np.eye(3) - np.outer(c, c))
         first += m * c
         mass += m
     return inertia, first, mass
-
-
-def _welded(model: mujoco.MjModel, link: int) -> Iterator[tuple[int, Array, Array]]:
-    """Yield the bodies of a link, and where they stand in its frame."""
-    yield link, np.zeros(3), np.eye(3)
-    for body in range(link + 1, model.nbody):
-        if model.body_weldid[body] == link:
-            _, position, rotation = _placement(model, body)
-            yield body, position, rotation
 
 
 def _rotation(quaternion: Array) -> Array:

@@ -40,7 +40,9 @@ def from_urdf(text: str) -> tuple[mujoco.MjSpec, list[str]]:
     rotors = dict(_rotors(root))
     for other in [child for child in root if child.tag in ("gazebo", "transmission", "ros2_control", "mujoco")]:
         root.remove(other)
-    _require_plain(root)
+    computed = any(mark in value for element in root.iter() for value in element.attrib.values() for mark in ("${", "$("))
+    if computed or any(str(element.tag).startswith(("xacro:", "{http://www.ros.org/wiki/xacro}")) for element in root.iter()):
+        raise RobotError("this is a xacro, from which a URDF is made first: xacro arm.urdf.xacro > arm.urdf")
     mended = list(_mend(root))
     spec = mujoco.MjSpec.from_string(_written(root, lines))
     for joint in root.iter("joint"):
@@ -113,13 +115,6 @@ def _written(root: ElementTree.Element, lines: Lines) -> str:
         names.append(element.tag)
         open_.append(iter(list(element)))
     return "".join(written)
-
-
-def _require_plain(root: ElementTree.Element) -> None:
-    """Raise RobotError if something is left to be computed: in a xacro."""
-    computed = any(mark in value for element in root.iter() for value in element.attrib.values() for mark in ("${", "$("))
-    if computed or any(str(element.tag).startswith(("xacro:", "{http://www.ros.org/wiki/xacro}")) for element in root.iter()):
-        raise RobotError("this is a xacro, from which a URDF is made first: xacro arm.urdf.xacro > arm.urdf")
 
 
 def _mend(root: ElementTree.Element) -> Iterator[str]:

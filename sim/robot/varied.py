@@ -113,12 +113,6 @@ def _set_link(robot: Robot, joint: int, values: Array, fields: dict[str, Array])
         if model.body_weldid[body] == link:
             fields["body_mass"][:, body], fields["body_inertia"][:, body] = 0.0, 0.0
     fields["body_mass"][:, link], fields["body_inertia"][:, link] = mass, moments
-    fields["body_ipos"][:, link], fields["body_iquat"][:, link] = centre, _quaternions(axes)
-
-
-def _quaternions(rotation: Array) -> Array:
-    """Return unit quaternions w x y z of rotation matrices, shape (nsim, 4)."""
-    found = np.zeros((len(rotation), 4))
-    for quaternion, matrix in zip(found, rotation.reshape(-1, 9), strict=True):
-        mujoco.mju_mat2Quat(quaternion, matrix)
-    return found
+    fields["body_ipos"][:, link] = centre
+    for k, matrix in enumerate(axes.reshape(-1, 9)):
+        mujoco.mju_mat2Quat(fields["body_iquat"][k, link], matrix)

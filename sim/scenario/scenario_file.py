@@ -87,8 +87,10 @@ def from_dict(content: Mapping[str, Any]) -> Scenario:
         raise ScenarioError(
             f'this is a scenario of idbench 0.1.0: write {", ".join(old)} below a line [trajectory], with kind = "quintic"'
         )
-    if isinstance(made.get("trajectory"), str):
-        made["trajectory"] = _trajectory_of(made["trajectory"])
+    if isinstance(other := made.get("trajectory"), str):  # that of another scenario, which must be its own
+        made["trajectory"] = _content(other).get("trajectory")
+        if isinstance(made["trajectory"], str):
+            raise ScenarioError(f"trajectory = {other!r}: that scenario has none of its own; name {made['trajectory']!r}")
     wrong = []
     for key, table in KINDS.items():
         if key in made and not isinstance(made[key], table.kind):
@@ -100,23 +102,12 @@ def from_dict(content: Mapping[str, Any]) -> Scenario:
     try:
         scenario: Scenario = make(Scenario, made, "")
     except ScenarioError as error:
-        raise ScenarioError("; ".join([*wrong, *_besides(str(error), content)])) from error
+        rest = str(error).split("; ")  # but for keys that were taken out because they are wrong themselves
+        rest = [part for part in rest if not any(part.startswith(f"key {key!r} is missing") for key in content)]
+        raise ScenarioError("; ".join([*wrong, *rest])) from error
     if wrong:
         raise ScenarioError("; ".join(wrong))
     return scenario
-
-
-def _besides(error: str, content: Mapping[str, Any]) -> list[str]:
-    """Errors, but for keys that were taken out because they are wrong themselves."""
-    return [part for part in error.split("; ") if not any(part.startswith(f"key {key!r} is missing") for key in content)]
-
-
-def _trajectory_of(name: str) -> Any:
-    """Return the trajectory of another scenario, which must be its own."""
-    trajectory: Any = _content(name).get("trajectory")
-    if isinstance(trajectory, str):
-        raise ScenarioError(f"trajectory = {name!r}: that scenario has none of its own; name {trajectory!r}")
-    return _plugin("trajectory", TRAJECTORIES, trajectory)
 
 
 def _plugin(key: str, table: PluginTable[Any], content: Mapping[str, Any]) -> Any:

@@ -18,10 +18,9 @@ from timing import seconds as timed
 
 from idbench.experiments.identification.request import Request
 from idbench.experiments.identification.scenario_run import ScenarioRun
-from idbench.experiments.recording.audience import Audience
+from idbench.experiments.recording.audience import Audience, served
 from idbench.experiments.recording.identification_recording import RunRecording
 from idbench.experiments.recording.motion_layer import Base
-from idbench.experiments.recording.viewers import served
 from idbench.experiments.results.attempts import write_streams
 from idbench.experiments.results.folder import ResultsFolder
 from idbench.identify import MotionLog

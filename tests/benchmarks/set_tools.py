@@ -20,7 +20,7 @@ from idbench.identify.arrays import combined
 from idbench.identify.rows.rows import manageable
 from idbench.sim.robot.tree import standard_parameters
 from idbench.sim.robot.urdf import parsed
-from idbench.sim.robot.write_urdf import urdf_text
+from idbench.sim.robot.written_xml import urdf_text
 
 
 def what_tools_read(fit: Fit) -> dict[str, Any]:

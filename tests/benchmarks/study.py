@@ -19,7 +19,7 @@ from idbench.experiments.recording.study_recording import StudyRecording
 from idbench.experiments.results.folder import ResultsFolder
 from idbench.experiments.results.page import Page
 from idbench.experiments.study.cluster import cluster_pool
-from idbench.experiments.study.run_study import local_pool, run_missing
+from idbench.experiments.study.job import local_pool, run_missing
 from idbench.experiments.study.store import Store
 from idbench.experiments.study.study import Study
 from idbench.experiments.study.study_file import study_from

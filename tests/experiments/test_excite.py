@@ -180,7 +180,7 @@ def test_motions_follow_until_all_is_known(ran):
 
 @pytest.mark.thorough
 def test_what_stays_unknown_is_told_and_nothing_is_lost(tmp_path, monkeypatch, ran):
-    monkeypatch.setattr("idbench.experiments.excite.sequence.ROUNDS", 1)
+    monkeypatch.setattr("idbench.experiments.excite.job.ROUNDS", 1)
     assert re.search("not reached after 1 motions: F[sv]2 still makes", ran(DESIGN, "--until 0.0001%").out)
     assert {"log1.parquet", "motion1.csv", "motion.csv"} < ({x.name for x in (tmp_path / "out").iterdir()} - {MANIFEST})
 

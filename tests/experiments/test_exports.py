@@ -24,8 +24,7 @@ from idbench.sim.robot.inverse_dynamics import inverse_dynamics
 from idbench.sim.robot.mounting import PLAIN
 from idbench.sim.robot.robot import Robot
 from idbench.sim.robot.tree import kinematic_tree, standard_parameters
-from idbench.sim.robot.write_sdf import sdf_text
-from idbench.sim.robot.write_urdf import urdf_text
+from idbench.sim.robot.written_xml import sdf_text, urdf_text
 from idbench.sim.trajectories import RandomMoves
 
 DRAKE = """

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from idbench.experiments.cli import main
-from idbench.experiments.servo.device import device_of, devices
+from idbench.experiments.servo.servo_files import device_of, devices
 from idbench.identify.files.servo_file import ServoFile
 
 

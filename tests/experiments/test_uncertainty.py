@@ -10,7 +10,7 @@ import pytest
 import idbench
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.logs import DELAYS
-from idbench.experiments.reports.uncertainty import correlated, words_of_uncertainty
+from idbench.experiments.reports.estimates import correlated, words_of_uncertainty
 from idbench.identify import MODELS, TorqueChannel, identify, scara
 from idbench.sim import load_scenario, run
 

@@ -22,8 +22,8 @@ from idbench.identify import (
     scara,
 )
 from idbench.identify.judge.delay import estimate_delay
-from idbench.identify.judge.mask_choice import suited_reach
 from idbench.identify.judge.torque_interval import torque_interval
+from idbench.identify.judge.used_rows import suited_reach
 from idbench.identify.rows.operators import Samples
 
 spec = importlib.util.spec_from_file_location("faulty_logs", Path(__file__).parent / "faulty_logs.py")

@@ -13,7 +13,7 @@ from idbench.sim.robot.placed import numbers, without_rounding
 from idbench.sim.robot.rewrite import rewritten
 from idbench.sim.robot.robot import Robot
 from idbench.sim.robot.tree import kinematic_tree
-from idbench.sim.robot.write_urdf import urdf_text
+from idbench.sim.robot.written_xml import urdf_text
 
 SOLID = '<inertial><mass value="1"/><inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial>'
 

@@ -7,9 +7,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from idbench.sim.drives import SwitchedDrive
-from idbench.sim.drives.pwm import Modulator, pieces
+from idbench.sim.drives.pwm import Modulator, Winding, pass_period, pieces, stretches
 from idbench.sim.drives.switched_drive import ExactPeriods, TabulatedPeriods
-from idbench.sim.drives.winding import Winding, pass_period, stretches
 from idbench.sim.engine.simulation import simulate
 from idbench.sim.robot.robot import Robot
 from idbench.sim.scenario.measurement import Ripple

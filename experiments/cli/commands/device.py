@@ -8,8 +8,7 @@ from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.robot_model import absolute
 from idbench.experiments.results.page import Page
 from idbench.experiments.results.writing import write_text
-from idbench.experiments.servo.device import BENCH, device_of, devices, mjcf_of_device, servo_toml_of
-from idbench.experiments.servo.servo_files import cannot_express
+from idbench.experiments.servo.servo_files import BENCH, cannot_express, device_of, devices, mjcf_of_device, servo_toml_of
 from idbench.experiments.text import new_table, print_titled
 from idbench.identify.tables import concise
 from idbench.sim.robot.robot import Robot

@@ -10,8 +10,7 @@ from idbench.experiments.cli.command import command_of, with_own_parts
 from idbench.experiments.cli.options.jobs import Excite
 from idbench.experiments.cli.saving import Files, folder_of, saved, write_scenario
 from idbench.experiments.excite.excited import Excited
-from idbench.experiments.excite.job import designed, excited, write_motion
-from idbench.experiments.excite.sequence import MotionSequence
+from idbench.experiments.excite.job import MotionSequence, designed, excited, write_motion
 from idbench.experiments.judgement.warnings import FILE, warnings_of_robot
 from idbench.experiments.program import program
 from idbench.experiments.recording.audience import Audience

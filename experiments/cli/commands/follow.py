@@ -20,7 +20,7 @@ from idbench.identify.arrays import TINY
 from idbench.identify.files.log_file import CSV
 
 if TYPE_CHECKING:
-    from idbench.experiments.recording.live_layer import LiveIdentification
+    from idbench.experiments.recording.identification_layer import LiveIdentification
     from idbench.experiments.recording.motion_layer import Base
 
 EVERY = 0.25  # Time between two looks at the file [s]
@@ -124,10 +124,9 @@ class Follower:
         """Growing recording, begun with the first look."""
         if self._live is not None:
             return self._live
-        from idbench.experiments.recording.columns import parts
-        from idbench.experiments.recording.live_layer import LiveIdentification
+        from idbench.experiments.recording.identification_layer import LiveIdentification
         from idbench.experiments.recording.motion_layer import Base
-        from idbench.experiments.recording.stream import Stream
+        from idbench.experiments.recording.stream import Stream, parts
 
         robot_model, name = self.request.robot_model, f"following-{self.path.stem}"
         if self.audience:

@@ -20,14 +20,12 @@ from idbench.experiments.identification.logs import delay_method
 from idbench.experiments.identification.reading import DELAY_FOUND, file_of
 from idbench.experiments.identification.request import Request
 from idbench.experiments.inputs import files_of
-from idbench.experiments.judgement.conclusion import conclusion
-from idbench.experiments.judgement.judgement import Judgement, judge
+from idbench.experiments.judgement.judgement import Judgement, conclusion, judge
 from idbench.experiments.judgement.remedies import checks
 from idbench.experiments.note import noted
 from idbench.experiments.recording.audience import Audience
 from idbench.experiments.reports.estimates import models_in_full
-from idbench.experiments.reports.printed import print_fit
-from idbench.experiments.reports.printed_held_out import print_held_out
+from idbench.experiments.reports.printed import print_fit, print_held_out
 from idbench.experiments.results.attempts import Attempts
 from idbench.experiments.results.folder import ResultsFolder
 from idbench.experiments.results.page import COLORS, Page, stages_of

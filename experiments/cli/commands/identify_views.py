@@ -10,8 +10,7 @@ from idbench.experiments.cli.options.jobs import Identify
 from idbench.experiments.errors import ExperimentError, ResultsError
 from idbench.experiments.exports.exports import EXPORTS
 from idbench.experiments.identification.robot_model import RobotModel
-from idbench.experiments.judgement.conclusion import Conclusion
-from idbench.experiments.judgement.judgement import Judgement
+from idbench.experiments.judgement.judgement import Conclusion, Judgement
 from idbench.experiments.recording.audience import Audience
 from idbench.experiments.results.attempts import Attempts
 from idbench.experiments.results.folder import RECORDING, ResultsFolder

@@ -12,8 +12,7 @@ from idbench.experiments.program import program
 from idbench.experiments.recording.audience import Audience
 from idbench.experiments.results.folder import ResultsFolder
 from idbench.experiments.results.page import Page, runs_of
-from idbench.experiments.study.job import LARGEST_SHARD, runs_of_shard, store_of, worker_pool
-from idbench.experiments.study.run_study import run_missing
+from idbench.experiments.study.job import LARGEST_SHARD, run_missing, runs_of_shard, store_of, worker_pool
 from idbench.experiments.study.statistics import cells
 from idbench.experiments.study.store import Store, arrays
 from idbench.experiments.study.study_file import load_study, names

@@ -7,9 +7,9 @@ from pathlib import Path
 
 from idbench.experiments.cli.options.tools import View
 from idbench.experiments.errors import ExperimentError, ResultsError
+from idbench.experiments.recording.audience import LOOPBACK, require_display, viewer_binary
 from idbench.experiments.recording.comparison_recording import compare
 from idbench.experiments.recording.folder import BASE, files, merge
-from idbench.experiments.recording.viewers import LOOPBACK, require_display, viewer_binary
 from idbench.experiments.results.page import Page
 from idbench.experiments.results.writing import new_file
 

@@ -39,20 +39,16 @@ class SelectedRows(AbstractEstimator):
 
     def solve(self, problem: Problem) -> Estimate:
         """Return the estimate of every run."""
-        rows = problem.rows
-        apart = _length(problem) if self.apart is None else self.apart
+        rows, operator, fs = problem.rows, problem.own_chain.operator, problem.logs[0].fs
+        # All rows that are no integrals are selected.
+        length = (len(operator.response(fs)) - 1) / fs if isinstance(operator, AbstractWeakForm) else 0.0
+        apart = length if self.apart is None else self.apart
         starts = np.concatenate([np.full(len(part.time) * rows.kinds, k) for k, part in enumerate(rows.maps)])
         weight = np.zeros(rows.Y.shape)
         for run in np.ndindex(rows.Y.shape[:-1]):
             weight[run] = selected(rows.W[run], rows.valid[run], rows.time, starts, apart)
         found = with_weights(rows.Y, rows.W, weight)
         return Estimate(problem, frozen(found.X), frozen(found.covariance), Given(found.G))
-
-
-def _length(problem: Problem) -> float:
-    """Return the length of the windows [s]; 0 of rows that are no integrals, all of which are then selected."""
-    operator, fs = problem.own_chain.operator, problem.logs[0].fs
-    return (len(operator.response(fs)) - 1) / fs if isinstance(operator, AbstractWeakForm) else 0.0
 
 
 def selected(W: Array, valid: npt.NDArray[np.bool_], time: Array, log: Array, apart: float) -> npt.NDArray[np.bool_]:

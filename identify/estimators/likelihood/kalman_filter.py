@@ -8,7 +8,6 @@ import numpy as np
 
 from idbench.identify.arrays import HELD, Array, frozen
 from idbench.identify.basis.basis import Basis
-from idbench.identify.data.motion_log import MotionLog
 from idbench.identify.errors import IdentificationError, require_positive
 from idbench.identify.estimators.estimate import Estimate
 from idbench.identify.estimators.estimator import AbstractEstimator, Need
@@ -109,17 +108,12 @@ def _filtered(
         weight = MASK.weight(signals.state.qd[run], log.fs)
         unknown = UNKNOWN * friction_jumps(problem.basis, X, log.q[0])
         variance = (level[:, None] + (1 - weight) * unknown[:, None]) ** 2
-        one = _Filter(problem.basis, _mean_torques(log), log.fs, variance, np.maximum(noise.position, MIN_NOISE))
+        at = np.arange(log.samples) - log.torque.delay * log.fs
+        tau = np.stack([np.interp(at, np.arange(len(x)), x) for x in Cells.of(log).torque[0]])  # mean from sample to sample
+        one = _Filter(problem.basis, tau, log.fs, variance, np.maximum(noise.position, MIN_NOISE))
         more, state, P = one.run(log.q, state, P, sigma)
         likelihood += more
     return likelihood, state, P * np.outer(sigma, sigma), level
-
-
-def _mean_torques(log: MotionLog) -> Array:
-    """Return the mean torque between each sample and the next, shape (joint, time) [N m]."""
-    tau = Cells.of(log).torque[0]
-    at = np.arange(log.samples) - log.torque.delay * log.fs
-    return np.stack([np.interp(at, np.arange(len(x)), x) for x in tau])
 
 
 @dataclass(frozen=True, eq=False)

@@ -129,16 +129,12 @@ class Rounds:
 
         iterate(round_, X, self.most, shown=True)
         self._require_same_motion(MAX_DEVIATION)
-        self._require_settled(move, left)
-        assert found is not None  # there is a round at least
-        return found
-
-    def _require_settled(self, move: Array, left: Array) -> None:
-        """Let runs fail that have not converged."""
         for run in map(tuple, np.argwhere(self.active & ~(left < UNSETTLED)).tolist()):
             k = int(np.argmax(move[run]))
             advice = "does the simulated loop have the log's controller and motion? If so, start closer to the true parameters"
             self.fail(run, not_converged(self.problem.names[k], float(move[run][k]), self.most, advice))
+        assert found is not None  # there is a round at least
+        return found
 
     def simulated(self, X: Array) -> Simulated:
         """Return the logs of robots with these parameters, shape (..., run, p); those of runs that failed mean nothing.

@@ -5,9 +5,8 @@ import numpy as np
 import pytest
 import rerun as rr
 
-from idbench.experiments.recording.columns import time_columns
 from idbench.experiments.recording.motion_layer import Arm
-from idbench.experiments.recording.stream import Stream
+from idbench.experiments.recording.stream import Stream, time_columns
 from idbench.sim.robot.robot import Robot
 from idbench.sim.robot.scene import Mover, shapes
 

@@ -5,9 +5,8 @@ import pytest
 from rerun.chunk import RrdReader
 
 from idbench.experiments.recording.chart import HEIGHT, WIDE, Chart
-from idbench.experiments.recording.columns import seconds
 from idbench.experiments.recording.scales import decades, linear, listed, named, signed
-from idbench.experiments.recording.stream import Stream
+from idbench.experiments.recording.stream import Stream, seconds
 from idbench.experiments.recording.views import Shelf
 from idbench.experiments.text import TICKS, of_each
 

@@ -8,9 +8,9 @@ from rerun.chunk import RrdReader
 
 from idbench.experiments.cli import main
 from idbench.experiments.errors import ResultsError
-from idbench.experiments.recording.columns import parts
 from idbench.experiments.recording.folder import files, known, merge
 from idbench.experiments.recording.run_layouts import friction
+from idbench.experiments.recording.stream import parts
 from idbench.experiments.recording.views import Shelf
 
 

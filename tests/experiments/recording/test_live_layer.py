@@ -9,7 +9,7 @@ from idbench.experiments.identification.logs import Logs
 from idbench.experiments.identification.method import Method
 from idbench.experiments.identification.request import Request
 from idbench.experiments.identification.robot_model import RobotModel
-from idbench.experiments.recording.live_layer import LiveIdentification
+from idbench.experiments.recording.identification_layer import LiveIdentification
 from idbench.experiments.recording.stream import Stream
 from idbench.identify import MotionLog
 
@@ -56,7 +56,7 @@ def test_a_fault_in_it_is_told_once_and_the_run_goes_on(table1, monkeypatch, cap
         raise np.linalg.LinAlgError("on purpose")
 
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    monkeypatch.setattr("idbench.experiments.recording.live_layer.fit", broken)
+    monkeypatch.setattr("idbench.experiments.recording.identification_layer.fit", broken)
     log = table1.log
     live = LiveIdentification(Stream("broken"), RobotModel(), "idbench", log.torque, log.fs, JOINTS)
     assert not any(live.grow(log.q[k : k + 500], log.tau[k : k + 500]) for k in range(0, 2000, 500))

@@ -8,8 +8,8 @@ from rerun.chunk import RrdReader
 
 from idbench.experiments.recording.audience import Audience
 from idbench.experiments.recording.chart import SQUARE
-from idbench.experiments.recording.columns import POSES, shown
 from idbench.experiments.recording.identification_recording import RunRecording
+from idbench.experiments.recording.stream import POSES, shown
 from idbench.identify import measured_state
 from idbench.sim.robot.scene import Mover, shapes
 from idbench.sim.scenario.scenario_file import from_dict

@@ -6,7 +6,7 @@ from contextlib import nullcontext
 import pytest
 
 from idbench.experiments.cli import main
-from idbench.experiments.study.run_study import local_pool, run_missing
+from idbench.experiments.study.job import local_pool, run_missing
 from idbench.experiments.study.store import Store
 from idbench.experiments.study.study_file import study_from
 

@@ -12,8 +12,8 @@ from distributed import LocalCluster
 from rerun.chunk import RrdReader
 
 from idbench.experiments.cli import main
+from idbench.experiments.study import job as engine
 from idbench.experiments.study import job as study_job
-from idbench.experiments.study import run_study as engine
 from idbench.experiments.study.store import Store
 
 

@@ -11,7 +11,7 @@ from threadpoolctl import threadpool_info, threadpool_limits
 from idbench.experiments.errors import StudyError
 from idbench.experiments.study import cluster
 from idbench.experiments.study.cluster import cluster_pool, compute, versions
-from idbench.experiments.study.run_study import compare_again, local_pool, run_missing
+from idbench.experiments.study.job import compare_again, local_pool, run_missing
 from idbench.experiments.study.shard import run_shard
 from idbench.experiments.study.store import Store
 from idbench.experiments.study.study_file import study_from
@@ -132,7 +132,7 @@ CODE = """
 import sys
 import time
 from pathlib import Path
-from idbench.experiments.study.run_study import local_pool, run_missing
+from idbench.experiments.study.job import local_pool, run_missing
 from idbench.experiments.study.store import Store
 store = Store.open(Path(sys.argv[1]))
 with local_pool(store.study, 2) as pool:

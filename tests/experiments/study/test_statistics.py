@@ -7,10 +7,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from idbench.experiments.study.answer import answer, requirements
-from idbench.experiments.study.comparison import SURE, differences
-from idbench.experiments.study.statistics import Cell, cells
-from idbench.experiments.study.worst_runs import WORST, worst_runs
+from idbench.experiments.study.answer import WORST, answer, requirements, worst_runs
+from idbench.experiments.study.statistics import SURE, Cell, cells, differences
 
 TRUTH = np.array([2.0, -0.5])
 
