@@ -14,7 +14,8 @@ SAME_NAME = {
 }
 """Classes of one name in several files, and why."""
 
-LINES = 53_385
+LINES = {".py": 53_296, ".c": 705, ".h": 28, ".txt": 325, ".j2": 278}
+"""Lines of Python, of C, and of templates of code and pages."""
 
 BASES = {"Plant", "Table", "Command", "WrittenOptions", "RecordedOptions", "LogRequest", "LoadRequest"}
 """Classes that are used as they are, and inherited from."""
@@ -74,8 +75,10 @@ def test_one_class_of_a_name(syntax):
 
 
 def test_the_house_only_gets_smaller(root):
-    """Whoever lowers the number of lines writes it here; nobody raises it."""
-    assert sum(len(path.read_text().splitlines()) for room in ROOMS for path in (root / room).rglob("*.py")) <= LINES
+    """Whoever lowers a number of lines writes it here; nobody raises one."""
+    for suffix, most in LINES.items():
+        paths = [path for room in ROOMS for path in (root / room).rglob(f"*{suffix}")]
+        assert sum(len(path.read_text().splitlines()) for path in paths) <= most, suffix
 
 
 def test_nothing_inherits_from_what_is_not_abstract(syntax):

@@ -42,7 +42,9 @@ class Exported:
 def origin(fit: Fit, model: str) -> str:
     """What a file is from, in a sentence."""
     logs = ", ".join(fit.logs.names) or "a log"
-    return f"identified from {logs} by {fit.request.method.estimator_name} of the {model} model, idbench {version('idbench')}"
+    unknown = f"; NOTHING IS KNOWN of {', '.join(fit.still)}, which never moved" if fit.still else ""
+    by = f"{fit.request.method.estimator_name} of the {model} model"
+    return f"identified from {logs} by {by}, idbench {version('idbench')}{unknown}"
 
 
 def _marked(text: str, fit: Fit, model: str) -> str:

@@ -7,7 +7,7 @@ from typing import Any, Self
 import numpy as np
 
 from idbench.experiments.identification.causes import Cause, causes_of
-from idbench.experiments.identification.logs import Logs
+from idbench.experiments.identification.logs import Logs, resting
 from idbench.experiments.identification.rates import CONTROLLER, Rates
 from idbench.experiments.identification.request import Request
 from idbench.experiments.identification.robot_model import RobotModel
@@ -85,6 +85,12 @@ class Fit:
         suspects = suspects or unknown
         log, gains, stated = self.logs.fitted[0], self.logs.gains, wrong[1] if wrong else ""
         return causes_of((*self.silent, *suspects), self.robot_model, log, gains, stated)
+
+    @property
+    def still(self) -> list[str]:
+        """Joints that never move, of which nothing is known."""
+        found = [resting(log, self.robot_model.robot.joints) for log in self.logs.fitted]
+        return [joint for joint in found[0] if all(joint in each for each in found)]
 
     @cached_property
     def motion_shares(self) -> list[MotionShare]:

@@ -74,7 +74,6 @@ MOST_TURNS = 2.0
 HARDLY = 0.02  # Share of its range below which a joint hardly moves
 MOST_JUMPS = 3  # Jumps of a log that are named
 JUMPS = "jumps"  # What some warnings of logs are about
-STILL = 1e-3  # A joint that travels less than this share of what the busiest does is at rest, and trembles
 
 
 def warnings_of_log(log: MotionLog, tree: KinematicTree) -> list[str]:
@@ -161,9 +160,3 @@ def warnings_of_base(tree: KinematicTree) -> list[str]:
         f"{len(first)} chains of joints start at the ground ({', '.join(first[:4])}{', ...' if len(first) > 4 else ''}): the "
         "robot is taken as fixed there; if it walks, drives or flies, its base makes torques that no parameter describes"
     ]
-
-
-def resting(log: MotionLog, tree: KinematicTree) -> list[str]:
-    """Return the joints that never move."""
-    travel = np.ptp(log.q.reshape(-1, log.n), axis=0)
-    return [joint.name for joint, way in zip(tree.joints, travel, strict=True) if way <= STILL * travel.max()]

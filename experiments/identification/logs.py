@@ -16,7 +16,7 @@ from idbench.identify.judge.band import content_end
 from idbench.identify.judge.delay import DelayEstimate, estimate_delay, estimate_joint_delays
 from idbench.identify.rows.rows import is_long
 
-STILL = 1e-3  # A joint is at rest while its velocity is below this share of its largest
+STILL = 1e-3  # Share of its largest velocity below which a joint is at rest, and of the busiest one's travel: it trembles
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,6 +93,12 @@ class LogFacts:
             "joints": self.rows,
             "notes": list(self.notes()),
         }
+
+
+def resting(log: MotionLog, joints: Sequence[str]) -> list[str]:
+    """Return the joints that never move."""
+    travel = np.ptp(log.q.reshape(-1, log.n), axis=0)
+    return [joint for joint, way in zip(joints, travel, strict=True) if way <= STILL * travel.max()]
 
 
 DELAYS: Mapping[str, Callable[[Sequence[MotionLog], Basis, Chain], DelayEstimate]] = {

@@ -9,7 +9,7 @@ import numpy as np
 from idbench.experiments.errors import is_told, reason, trace
 from idbench.experiments.identification.causes import Cause, remedy_of
 from idbench.experiments.identification.fit import Fit
-from idbench.experiments.identification.log_warnings import JUMPS, resting
+from idbench.experiments.identification.log_warnings import JUMPS
 from idbench.experiments.identification.robot_model import ASSUMED
 from idbench.experiments.judgement.held_out import FAIR, GOOD, WORDS, HeldOut, Verdict, on_last_quarter, on_log
 from idbench.experiments.judgement.warnings import DELAY, LOG, MODEL
@@ -152,7 +152,7 @@ def _finding(judgement: Judgement, causes: Sequence[Cause]) -> str:
 def _power(fit: Fit) -> Iterator[str]:
     """Yield what a good result would have seen, and of which joints nothing is known."""
     joints = fit.robot_model.robot.joints
-    if still := [joint for joint in joints if all(joint in resting(log, fit.robot_model.tree) for log in fit.logs.fitted)]:
+    if still := fit.still:
         yield f"nothing is known of {', '.join(still)}: no motion"
     if fit.hidden_gains is not None:
         some = [(x, joint) for x, joint in zip(fit.hidden_gains, joints, strict=True) if joint not in still]

@@ -5,7 +5,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 import numpy as np
 
 from idbench.experiments.identification.fit import Fit
-from idbench.experiments.identification.log_warnings import resting, unlike_file, warnings_of_base
+from idbench.experiments.identification.log_warnings import unlike_file, warnings_of_base
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.note import Note
 from idbench.identify import brisk_shares, showing_moves
@@ -162,7 +162,7 @@ def hidden_notes(fit: Fit) -> list[str]:
     notes = [f"without the torque of {joints}, {', '.join(lost)} are not shown: left out, as if zero"] if lost else []
     if not still:
         return notes
-    at_rest = ", ".join(resting(fit.logs.fitted[0], robot.tree))
+    at_rest = ", ".join(fit.still)
     moves = f"{at_rest} never moves in this log: move it" if at_rest else _moves(robot, still)
     why = f" ({moves})" if moves else ""
     return [*notes, f"this log does not excite {', '.join(still)}: left out, as if zero{why}"]
