@@ -214,22 +214,26 @@ def late(read: ReadLog, channel: TorqueChannel) -> ReadLog:
 
 def asked_of(options: ColumnOptions) -> Asked:
     """What options say of a log's columns."""
-    found: dict[str, dict[str, Any]] = {"columns": {}, "units": {}}
-    for quantity, texts in (("columns", options.columns), ("units", options.units)):
-        for text in texts:
-            name, mark, value = text.partition("=")
-            if name not in ("t", "q", "qd", "qdd", "tau") or not mark or not value:
-                raise ExperimentError(
-                    f"--{quantity} {text}: give t=..., q=..., qd=..., qdd=... or tau=..., such as q=position_*"
-                )
-            found[quantity][name] = tuple(value.split(",")) if quantity == "columns" else value
-    try:
-        rows = {name: float(value) for name, _, value in (text.partition("=") for text in options.rows)}
-    except ValueError:
-        raise ExperimentError(f"--rows {' '.join(options.rows)}: give columns and numbers, such as episode_index=3") from None
     layout = LogLayout.read(options.layout) if options.layout else None
+    said = said_of(options.columns, options.units, options.rows, ("t", "q", "qd", "qdd", "tau"))
+    return replace(said, layout=layout, gain=options.gain, samples=options.samples)
+
+
+def said_of(columns: Sequence[str], units: Sequence[str], rows: Sequence[str], known: Sequence[str]) -> Asked:
+    """What texts NAME=VALUE say of the columns of `known` quantities, of their units and of rows."""
+    found = list[dict[str, str]]()
+    for option, texts in (("columns", columns), ("units", units)):
+        each = {name: value for name, _, value in (text.partition("=") for text in texts)}
+        if wrong := next((name for name, value in each.items() if name not in known or not value), None):
+            some = ", ".join(f"{name}=..." for name in known)
+            raise ExperimentError(f"--{option} {wrong}={each[wrong]}: give {some}, such as q=position_*")
+        found.append(each)
     try:
-        return Asked(layout, found["columns"], found["units"], rows, options.gain, options.samples)
+        conditions = {name: float(value) for name, _, value in (text.partition("=") for text in rows)}
+    except ValueError:
+        raise ExperimentError(f"--rows {' '.join(rows)}: give columns and numbers, such as episode_index=3") from None
+    try:
+        return Asked(None, {name: tuple(value.split(",")) for name, value in found[0].items()}, found[1], conditions)
     except SettingError as error:
         raise ExperimentError(f"--units: {error}") from error
 

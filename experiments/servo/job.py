@@ -11,6 +11,7 @@ import numpy as np
 from idbench.experiments.document import Document
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.causes import suspect_summary
+from idbench.experiments.identification.reading import said_of
 from idbench.experiments.identification.robot_model import absolute
 from idbench.experiments.requests.jobs import ServoRequest
 from idbench.experiments.servo.identification import AUTO, Servos, summary_of
@@ -18,7 +19,7 @@ from idbench.experiments.servo.joints import Identified
 from idbench.experiments.servo.servo_text import remedy_of, servo_table, verdict_lines, warnings_of
 from idbench.identify import Array, IdentificationError, SettingError
 from idbench.identify.files.servo_file import ServoFile
-from idbench.identify.files.servo_log import ServoColumns, ordered, read_servo_log
+from idbench.identify.files.servo_log import USUAL, ServoColumns, ordered, read_servo_log
 from idbench.identify.judge.suspect import Suspect
 from idbench.identify.servo import SERVO_FRICTIONS, ServoFit
 from idbench.identify.servo.choice import ServoFrictionChoice, residuals_by_state
@@ -212,7 +213,7 @@ def _said(loops: Mapping[str, PositionLoop], known: ServoFile) -> Iterator[str]:
 def held_of(asked: ServoRequest, joints: Sequence[str]) -> dict[str, dict[str, float]]:
     """Parameters that are known, by joint: what names a joint goes before what names none."""
     try:
-        values = {name: float(value) for name, value in _stated("--hold", asked.hold).items()}
+        values = {name: float(value) for name, _, value in (text.partition("=") for text in asked.hold)}
     except ValueError:
         raise ExperimentError(f"--hold {' '.join(asked.hold)}: give letters and numbers, such as a=0.5") from None
     split = {name: name.rpartition(".") for name in values}
@@ -235,21 +236,10 @@ def _read(
     path: Path, asked: ServoRequest, joints: Sequence[str], loops: Mapping[str, PositionLoop]
 ) -> tuple[ServoColumns, str]:
     """A log in the order of the joints, commands as angles, and what was assumed of it."""
-    try:
-        rows = {name: float(value) for name, value in _stated("--rows", asked.rows).items()}
-    except ValueError:
-        raise ExperimentError(f"--rows {' '.join(asked.rows)}: give columns and numbers, such as episode_index=3") from None
-    columns, said = read_servo_log(path, _stated("--columns", asked.columns), _stated("--units", asked.units), rows)
+    columns, said = read_servo_log(path, said_of(asked.columns, asked.units, asked.rows, tuple(USUAL)))
     columns = ordered(columns, joints, {loop.actuator: joint for joint, loop in loops.items()}, path)
     if loops:
         both = [loops[joint].commanded(u) for joint, u in zip(joints, columns.command.T, strict=True)]
         angle, torque = (np.stack(x, axis=1) for x in zip(*both, strict=True))
         columns = replace(columns, command=angle, forward=torque if torque.any() else columns.forward)
     return columns, said
-
-
-def _stated(option: str, texts: Sequence[str]) -> dict[str, str]:
-    stated = [text.partition("=") for text in texts]
-    if wrong := [name for name, mark, value in stated if not mark or not value]:
-        raise ExperimentError(f"{option} {wrong[0]}: give NAME=VALUE, such as q=position_*")
-    return {name: value for name, _, value in stated}

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 
 from idbench.identify.arrays import Array
-from idbench.identify.errors import LogError, SettingError
+from idbench.identify.errors import LogError
 from idbench.identify.files.formats import read_table
 from idbench.identify.files.guess import EPISODES
 from idbench.identify.files.guess_units import FARTHEST, unit_of_times
-from idbench.identify.files.layout import LogLayout, Source, matching
+from idbench.identify.files.layout import Asked, LogLayout, Source, matching
 from idbench.identify.files.lerobot import data_file
 from idbench.identify.files.log_files import LogFiles
 from idbench.identify.files.table import LogTable, factor
@@ -53,35 +53,25 @@ class ServoColumns:
     """Commanded beside the angle: duty, torque [N m] or current [A], shape (time, joint)."""
 
 
-def read_servo_log(
-    path: Path, columns: Mapping[str, str], units: Mapping[str, str], rows: Mapping[str, float] | None = None
-) -> tuple[ServoColumns, str]:
+def read_servo_log(path: Path, asked: Asked = Asked()) -> tuple[ServoColumns, str]:  # noqa: B008  # frozen
     """Return the columns of a log of servos, and what was assumed of them in words; empty if nothing was.
 
     Parameters
     ----------
     path : Path
         CSV or other text, Parquet, a data set of LeRobot, NumPy, Matlab, a ROS bag.
-    columns, units : mapping of str to str
-        Names of columns (a * stands for numbers or names of joints, or a list with commas) and units, by quantity; by default
-        what `log.toml` beside it says, or `USUAL` in SI units.
-    rows : mapping of str to float, optional
-        Only rows in which columns have these values: an episode.
+    asked : Asked, optional
+        What is said of its columns; all else is as `log.toml` beside it says, or called as in `USUAL`, in SI units.
 
     Raises
     ------
     LogError
         If it cannot be read, or lacks a column.
-    SettingError
-        If a quantity or a unit is unknown.
     """
-    for quantity in (*columns, *units):
-        if quantity not in USUAL:
-            raise SettingError(f"{quantity!r} is no quantity of a servo's log; known: {', '.join(USUAL)}")
     path = data_file(path)
     table = read_table(path)
     beside = LogLayout.beside(path)
-    layout = _stated(path, table, beside[0] if beside else LogLayout(), columns, units, rows or {})
+    layout = _stated(path, table, beside[0] if beside else LogLayout(), asked)
     files = LogFiles(path, path.parent, layout, {path: table})
     found = {name: files.of(name, of) for name in USUAL if name != "t" and (of := getattr(layout, name)).columns}
     q, command = found["q"][0], found["command"][0]
@@ -104,20 +94,12 @@ def read_servo_log(
     return ServoColumns(t - t[0], q, command, on, voltage, joints, found["command"][1], forward), said
 
 
-def _stated(
-    path: Path,
-    table: LogTable,
-    layout: LogLayout,
-    columns: Mapping[str, str],
-    units: Mapping[str, str],
-    rows: Mapping[str, float],
-) -> LogLayout:
+def _stated(path: Path, table: LogTable, layout: LogLayout, asked: Asked) -> LogLayout:
     """Return the layout that is stated, by options before the file beside the log before the usual names."""
-    every = [*table.columns, *table.words]
+    every, layout = [*table.columns, *table.words], asked.over(layout)
     for name, usual in USUAL.items():
         source: Source = getattr(layout, name)
-        if name in columns:
-            source = Source(tuple(columns[name].split(",")), source.unit)
+        if name in asked.columns:
             if lacking := [x for x in source.columns if not _is_there((x,), every)]:
                 raise LogError(f"{path} has no column {lacking[0]} for {name}; its columns: {', '.join(every[:40])}. {NAME_IT}")
         elif not _is_there(source.columns, every):
@@ -125,12 +107,9 @@ def _stated(
             if called is None and name not in OPTIONAL:
                 raise LogError(f"{path} has no column {usual[0]} for {name}; its columns: {', '.join(every[:40])}. {NAME_IT}")
             plain = called is not None and "*" in called and called.replace("*", "") in every
-            source = Source((called.replace("*", "") if plain else called,) if called else (), source.unit)
-        if name in units:
-            factor(name, units[name])
-            source = replace(source, unit=units[name])
-        layout = layout.where(name, source)
-    return replace(layout, rows={**layout.rows, **rows})
+            called = called.replace("*", "") if called and plain else called
+            layout = layout.where(name, replace(source, columns=(called,) if called else ()))
+    return layout
 
 
 def _is_there(patterns: Sequence[str], names: Sequence[str]) -> bool:

@@ -18,6 +18,9 @@ TINY = 1e-12  # Second moment [kg m^2] below which MuJoCo takes it for none
 ROTOR_INERTIA, GEAR_RATIO = "drake:rotor_inertia", "drake:gear_ratio"
 """What Drake reads of a motor: inertia of its rotor [kg m^2], and turns of it for one of the joint."""
 
+ONCE = ("origin", "inertial", "mass", "inertia", "parent", "child", "axis", "limit", "dynamics")
+"""What a link, a joint or an inertia has once."""
+
 SIX = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 """What the numbers of an inertia matrix are called."""
 
@@ -43,7 +46,7 @@ def from_urdf(text: str) -> tuple[mujoco.MjSpec, list[str]]:
     computed = any(mark in value for element in root.iter() for value in element.attrib.values() for mark in ("${", "$("))
     if computed or any(str(element.tag).startswith(("xacro:", "{http://www.ros.org/wiki/xacro}")) for element in root.iter()):
         raise RobotError("this is a xacro, from which a URDF is made first: xacro arm.urdf.xacro > arm.urdf")
-    mended = list(_mend(root))
+    mended = [*_tidied(root), *_mend(root)]
     spec = mujoco.MjSpec.from_string(_written(root, lines))
     for joint in root.iter("joint"):
         limit = joint.find("limit")
@@ -52,6 +55,22 @@ def from_urdf(text: str) -> tuple[mujoco.MjSpec, list[str]]:
     for joint in spec.joints:
         joint.armature = rotors.get(joint.name, joint.armature)
     return spec, mended
+
+
+def _tidied(root: ElementTree.Element) -> Iterator[str]:
+    """Take out what other readers of URDF pass over, and declare a parent that they add; yield what was done."""
+    for owner in [*root.iter("link"), *root.iter("joint")]:
+        for element in (owner, *owner.findall("inertial")):
+            tags = [child.tag for child in element]
+            for k, child in reversed([*enumerate(element)]):
+                if child.tag in ONCE and child.tag in tags[:k]:
+                    element.remove(child)
+                    yield f"a second {child.tag} of {owner.get('name')}: the first one is taken"
+    known = {link.get("name") for link in root.iter("link")}
+    for name in dict.fromkeys(link_of(joint, "parent") for joint in root.iter("joint")):
+        if name and name not in known:
+            root.insert(0, ElementTree.Element("link", name=name))
+            yield f"no link {name}, the parent of a joint: it is taken as the ground"
 
 
 def _rotors(root: ElementTree.Element) -> Iterator[tuple[str, float]]:

@@ -13,6 +13,7 @@ import scipy.io
 from pyarrow import parquet
 
 from idbench.identify import LogError
+from idbench.identify.files.layout import Asked
 from idbench.identify.files.servo_file import ServoFile
 from idbench.identify.files.servo_log import read_servo_log
 
@@ -74,9 +75,10 @@ def write(folder, kind, t, q, command):
 READ = """
 import sys, json
 from pathlib import Path
+from idbench.identify.files.layout import Asked
 from idbench.identify.files.servo_log import read_servo_log
 path, columns, units = json.loads(sys.argv[1])
-found, _ = read_servo_log(Path(path), columns, units)
+found, _ = read_servo_log(Path(path), Asked(None, {name: tuple(x.split(',')) for name, x in columns.items()}, units))
 print(json.dumps([found.t.tolist(), found.q.tolist(), found.command.tolist(), list(found.joints)]))
 """
 
@@ -106,7 +108,7 @@ def test_threads_of_arrow_never_wait_for_python(tmp_path, data, kind, monkeypatc
         real = getattr(module, name)
         monkeypatch.setattr(module, name, lambda file, *rest, real=real, **more: given.append(file) or real(file, **more))
     path, columns, units = write(tmp_path, kind, *data)
-    read_servo_log(path, columns, units)
+    read_servo_log(path, Asked(None, {name: tuple(x.split(",")) for name, x in columns.items()}, units))
     assert [isinstance(file, pa.BufferReader) for file in given] == [True]
 
 
@@ -114,11 +116,11 @@ def test_episodes_are_named(tmp_path, data):
     t, q, command = data
     lerobot(tmp_path / "set", t, q, command, pa.list_(pa.float64()), twice=True)
     with pytest.raises(LogError, match=r"--rows episode_index=0"):
-        read_servo_log(tmp_path / "set", {}, {"q": "deg", "command": "deg"})
-    found, _ = read_servo_log(tmp_path / "set", {}, {"q": "deg", "command": "deg"}, {"episode_index": 1.0})
+        read_servo_log(tmp_path / "set", Asked(units={"q": "deg", "command": "deg"}))
+    found, _ = read_servo_log(tmp_path / "set", Asked(units={"q": "deg", "command": "deg"}, rows={"episode_index": 1.0}))
     np.testing.assert_allclose(found.q, q, atol=1e-6)
     with pytest.raises(LogError, match=r"state its unit.*q=deg"):
-        read_servo_log(tmp_path / "set", {}, {}, {"episode_index": 1.0})
+        read_servo_log(tmp_path / "set", Asked(rows={"episode_index": 1.0}))
 
 
 @pytest.mark.parametrize(
@@ -136,7 +138,7 @@ def test_times_of_any_kind(tmp_path, data, times, said):
     }[times]
     lines = [",".join([stamp, *(f"{x:.10g}" for x in row[1:])]) for stamp, row in zip(stamps, values, strict=True)]
     (tmp_path / "log.csv").write_text("\n".join([",".join(columns), *lines]) + "\n")
-    found, why = read_servo_log(tmp_path / "log.csv", {}, {})
+    found, why = read_servo_log(tmp_path / "log.csv")
     np.testing.assert_allclose(found.t, t, atol=1e-6)
     assert said in why
 
@@ -145,7 +147,7 @@ def test_a_position_that_is_shorter_than_a_command_is_named(tmp_path, data):
     t, q, command = data
     np.savez(tmp_path / "log.npz", t=t, q=q, command=command[:-3])
     with pytest.raises(LogError, match="60 samples of positions and 57 of commands"):
-        read_servo_log(tmp_path / "log.npz", {}, {})
+        read_servo_log(tmp_path / "log.npz")
 
 
 def test_a_torque_loop_knows_its_torques():
@@ -187,7 +189,7 @@ def test_a_bag_has_states_and_what_trajectories_command(tmp_path, data):
             if x >= 1.7e9 + 0.1:
                 sent = trajectory(header(at(x), ""), list(NAMES[::-1]), [point(there[::-1].copy(), none, none, none, now)])
                 writer.write(commands, int(x * 1e9), store.serialize_cdr(sent, trajectory.__msgtype__))
-    found, _ = read_servo_log(tmp_path / "bag", {}, {})
+    found, _ = read_servo_log(tmp_path / "bag")
     assert found.joints == NAMES
     np.testing.assert_allclose(found.q, q, atol=1e-9)
     np.testing.assert_allclose(found.command[6:], command[6:], atol=1e-9)
@@ -218,7 +220,7 @@ def test_the_player_of_the_page_writes_a_log_that_is_read(root, tmp_path, data, 
     exec(compile(code, "play.py", "exec"), scope)
     text(tmp_path / "commands.csv", ["t", *(f"command_{name}" for name in NAMES)], np.column_stack([t, command])[:15])
     scope["play"](Arm(), tmp_path / "commands.csv", tmp_path / "log.csv")
-    found, _ = read_servo_log(tmp_path / "log.csv", {}, {"q": "deg", "command": "deg"})
+    found, _ = read_servo_log(tmp_path / "log.csv", Asked(units={"q": "deg", "command": "deg"}))
     assert found.joints == NAMES
     np.testing.assert_allclose(found.command, command[:15], atol=1e-6)
     np.testing.assert_allclose(found.q[1:], command[:14], atol=1e-6)  # what was commanded is seen before the next command

@@ -52,6 +52,16 @@ def test_links_without_an_inertia_that_a_body_has_are_mended(load_urdf, inertial
     assert load_urdf(urdf("", SOLID, SOLID)).notes == ()
 
 
+def test_what_is_there_twice_or_not_declared_reads_as_elsewhere(load_urdf):
+    """As urdfdom reads it, and with it pinocchio: of two origins the first one; `world` is the ground."""
+    plain = urdf("", SOLID)
+    twice = load_urdf(plain.replace('<origin xyz="0 0 0.3" rpy="0.3 0 0"/>', '<origin xyz="0 0 0.3"/><origin xyz="0 0 2"/>'))
+    once = load_urdf(plain.replace('<link name="l0"></link>', "").replace('rpy="0.3 0 0"', ""))
+    assert twice.model.body_pos[-1].tolist() == once.model.body_pos[-1].tolist() == [0, 0, 0.3]
+    assert any("a second origin of j1: the first one is taken" in note for note in twice.notes)
+    assert any("no link l0" in note for note in once.notes)
+
+
 def test_a_link_whose_mass_is_welded_to_it_is_left_alone(load_urdf):
     weld = '<joint name="w" type="fixed"><parent link="l1"/><child link="l2"/></joint>'
     turn = '<joint name="j" type="continuous"><parent link="l0"/><child link="l1"/><axis xyz="0 0 1"/></joint>'

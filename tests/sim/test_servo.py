@@ -148,7 +148,7 @@ def test_a_watcher_receives_back_emf_and_gap():
 def test_a_log_has_commands_and_when_torque_was_off(tmp_path):
     run = simulate(replace(load("servo"), trajectory=replace(load("servo").trajectory, steps=10)))
     write_log(run.alone(), tmp_path / "log.csv", ("swing",))
-    columns, _ = read_servo_log(tmp_path / "log.csv", {}, {})
+    columns, _ = read_servo_log(tmp_path / "log.csv")
     np.testing.assert_allclose(columns.command[:, 0], run.reference.q[:, 0])
     off = np.any([(columns.t >= a - 1e-9) & (columns.t < b - 1e-9) for a, b in load("servo").drive.off], axis=0)
     assert 0 < off.mean() < 1
