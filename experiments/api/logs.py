@@ -23,6 +23,17 @@ def given_log(name: str, log: MotionLog, robot_model: RobotModel) -> ReadLog:
         place = [names.index(joint) for joint in joints]
         torque = log.torque.ordered(place)
         conditions = {key: x[..., place] if x.shape[-1] > 1 else x for key, x in log.conditions.items()}
-        log = replace(log, q=log.q[..., place], tau=log.tau[..., place], torque=torque, conditions=conditions, joints=joints)
+        motion = log.motion and (log.motion[0][..., place], log.motion[1][..., place])
+        missing = tuple(k for k, j in enumerate(place) if j in log.missing)
+        log = replace(
+            log,
+            q=log.q[..., place],
+            tau=log.tau[..., place],
+            torque=torque,
+            conditions=conditions,
+            joints=joints,
+            motion=motion,
+            missing=missing,
+        )
     columns = LogColumns(log.t, log.q, log.tau, log.torque, joints)
     return ReadLog(Path(name), (replace(log, joints=()),), columns, log.torque)

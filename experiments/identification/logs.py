@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from idbench.experiments.identification.poses import poses_of
 from idbench.experiments.note import Note, noted
 from idbench.identify import Array, Basis, Chain, IdentificationError, MotionLog, TorqueChannel, encoder_steps
 from idbench.identify.data.jumps import white_noise
@@ -35,19 +36,21 @@ class LogFacts:
     def log(self) -> MotionLog:
         """Its longest piece; samples by themselves as they are."""
         if self.columns.qdd is not None:
-            return MotionLog(1.0, self.columns.q, self.columns.tau, TorqueChannel("instantaneous"), poses=True)
+            return poses_of(self.columns, TorqueChannel("instantaneous"))[0]
         return max(self.repaired.logs, key=lambda log: log.samples)
 
     @cached_property
     def velocities(self) -> Array:
-        """Differences of the positions, shape (time, joint)."""
+        """Differences of the positions, or the velocities of samples, shape (time, joint)."""
+        if self.log.motion:
+            return self.log.motion[0]
         return np.asarray(np.gradient(self.log.q, 1 / self.log.fs, axis=0))
 
     @cached_property
     def rows(self) -> list[dict[str, Any]]:
         """What each joint's columns are like."""
         log, steps, speed = self.log, encoder_steps(self.columns.q), np.abs(self.velocities)
-        noises = [white_noise(x) for x in (log.q, log.tau)]
+        noises = [np.zeros(log.n) if log.poses else white_noise(x) for x in (log.q, log.tau)]
         return [
             {
                 "joint": joint,
@@ -80,24 +83,22 @@ class LogFacts:
 
     def summary(self) -> dict[str, Any]:
         """Content of --json."""
+        found = {"rows": len(self.columns.t), "joints": self.rows, "notes": list(self.notes())}
         if self.columns.qdd is not None:
-            return {"rows": len(self.columns.t), "joints": self.rows, "notes": list(self.notes())}
+            return found
         clock = self.repaired.clock
-        return {
+        return found | {
             "fs": self.log.fs,
             "duration": float(self.columns.t[-1] - self.columns.t[0]),
-            "rows": len(self.columns.t),
             "clock": clock.word,
             "repeated": clock.repeated,
             "gaps": clock.gaps,
-            "joints": self.rows,
-            "notes": list(self.notes()),
         }
 
 
 def resting(log: MotionLog, joints: Sequence[str]) -> list[str]:
     """Return the joints that never move."""
-    travel = np.ptp(log.q.reshape(-1, log.n), axis=0)
+    travel = np.ptp((log.q if log.motion is None else log.motion[0]).reshape(-1, log.n), axis=0)
     return [joint for joint, way in zip(joints, travel, strict=True) if way <= STILL * travel.max()]
 
 

@@ -100,7 +100,7 @@ def read(path: Path, options: LogRequest, robot_model: RobotModel | None, fallba
             f"{path}: all torques are 0: there is nothing to identify; of joints that nobody drives friction can be, where the "
             "links are known: --hold links=file"
         )
-    if columns.qdd is None:
+    if not poses:
         columns = replace(columns, q=_turned(path, columns.q, names, hinges, options.unwrap))
     assumed = options.torque_delay is None and stated is None and not options.reading.simulated
     notes = [columns.said] if columns.said else []
@@ -167,7 +167,13 @@ def read_as(
     """
     beside = LogLayout.beside(first)
     itself = path.suffix.lower() == LAYOUT_FILE or LogLayout.beside(path) is not None
-    if beside is None or beside[0].files or options.reading.stated or itself or read_table(path).torque is not None:
+    if (
+        beside is None
+        or beside[0].files
+        or asked_of(options.reading) != Asked()
+        or itself
+        or read_table(path).torque is not None
+    ):
         return read(path, options, robot_model, fallback)
     try:
         found = read(path, replace(options, reading=replace(options.reading, layout=beside[1])), robot_model, fallback)
@@ -274,21 +280,15 @@ def _turned(path: Path, q: Array, names: Sequence[str], hinges: Sequence[bool], 
 def channel_of(stated: TorqueChannel | None, meaning: Meaning, delay: str | None) -> TorqueChannel:
     """Return the channel that a file and the options state together: another meaning voids the delay that the file states."""
     stated = stated or TorqueChannel(meaning)
-    seconds = _seconds(delay, stated.delay if stated.meaning == meaning else 0.0)
+    same = stated.meaning == meaning
+    try:
+        seconds = (stated.delay if same else 0.0) if delay is None or delay in DELAYS else float(delay)
+    except ValueError:
+        raise ExperimentError(f"--torque-delay {delay} must be seconds, such as 0.002, or estimate, or joints") from None
     if not abs(seconds) < LATEST:
         raise ExperimentError(
             f"a torque delay of {seconds:g} s is impossible: it must be below {LATEST:g} s in size; is it in ms or in samples? "
             "Write s, such as --torque-delay 0.002, or let --torque-delay estimate find it"
         )
-    same = stated.meaning == meaning
     lags = stated.lags if same and delay is None else ()
     return replace(stated, meaning=meaning, delay=seconds, period=stated.period if same else None, lags=lags)
-
-
-def _seconds(delay: str | None, otherwise: float) -> float:
-    if delay is None or delay in DELAYS:
-        return otherwise
-    try:
-        return float(delay)
-    except ValueError:
-        raise ExperimentError(f"--torque-delay {delay} must be seconds, such as 0.002, or estimate, or joints") from None

@@ -154,7 +154,7 @@ def _power(fit: Fit) -> Iterator[str]:
     joints = fit.robot_model.robot.joints
     if still := fit.still:
         yield f"nothing is known of {', '.join(still)}: no motion"
-    if fit.hidden_gains is not None:
+    if fit.hidden_gains is not None and len(still) < len(joints):
         some = [(x, joint) for x, joint in zip(fit.hidden_gains, joints, strict=True) if joint not in still]
         worst, joint = max(some)
         if not worst < 1:

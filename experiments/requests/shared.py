@@ -69,11 +69,6 @@ class ColumnOptions:
     """Each row is a pose at rest, by itself: gravity alone is identified, by chain poses. Default: rows that are 0.5 s apart
     and do not continue each other are poses."""
 
-    @property
-    def stated(self) -> bool:
-        """Whether they say anything of columns."""
-        return bool(self.layout or self.columns or self.units or self.gain or self.rows or self.samples)
-
 
 @dataclass(frozen=True)
 class MountingOptions:

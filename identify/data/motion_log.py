@@ -148,8 +148,7 @@ class MotionLog:
                     f"{name} is {values.flat[np.abs(values).argmax()]:.3g} at some instant, more than {largest:.0e}, which is "
                     "impossible: are columns exchanged, or is this a mark for missing samples?"
                 )
-        for name, values in zip(("qd", "qdd"), self.motion or (), strict=False):
-            _require_finite(name, values)
+        self._require_motion()
         object.__setattr__(self, "conditions", {name: self._condition(name, x) for name, x in self.conditions.items()})
         if len(self.joints) not in (0, self.n):
             raise LogError(f"{len(self.joints)} names for {self.n} joints: {', '.join(self.joints)}")
@@ -161,6 +160,12 @@ class MotionLog:
         for name in ("lags", "delay_sigma"):
             if isinstance(x := getattr(self.torque, name), tuple) and len(x) not in (0, self.n):
                 raise LogError(f"{len(x)} {name} of torques for {self.n} joints")
+
+    def _require_motion(self) -> None:
+        for name, values in zip(("qd", "qdd"), self.motion or (), strict=False):
+            _require_finite(name, values)
+            if values.shape[-2:] != self.q.shape[-2:]:
+                raise LogError(f"{name} has shape {values.shape}, q {self.q.shape}: one of each joint at every sample")
 
     def _condition(self, name: str, values: npt.ArrayLike) -> Array:
         found = frozen(_real(name, values))
@@ -198,7 +203,8 @@ class MotionLog:
     def run(self, i: tuple[int | slice | list[int], ...]) -> "MotionLog":
         """Return one of independent runs, or some of them, as a log of its own."""
         conditions = {name: x[i] if x.ndim > 2 else x for name, x in self.conditions.items()}
-        return replace(self, q=self.q[i], tau=self.tau[i], conditions=conditions)
+        motion = self.motion and (self.motion[0][i], self.motion[1][i]) if self.q.ndim > 2 else self.motion
+        return replace(self, q=self.q[i], tau=self.tau[i], conditions=conditions, motion=motion)
 
     @classmethod
     def at_times(

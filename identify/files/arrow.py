@@ -75,7 +75,9 @@ def read_text(path: Path) -> LogTable:
         table = csv.read_csv(held, read_options=read, parse_options=parse, convert_options=convert)
     except UnicodeDecodeError as error:
         raise LogError(f"cannot read the log {path}: byte {error.start} of its header is no UTF-8; save it as UTF-8") from error
-    except (pa.ArrowException, gzip.BadGzipFile, EOFError) as error:
+    except LogError:
+        raise
+    except (pa.ArrowException, gzip.BadGzipFile, EOFError, ValueError) as error:
         raise LogError(f"cannot read the log {path} as CSV: {str(error).splitlines()[0]}") from error
     first = 1 + skipped + (0 if names else 1)
     values = (_numbers(column, first) for column in table.columns)
@@ -137,7 +139,7 @@ def _head(path: Path) -> tuple[int, list[str], bytes, int]:
 def _table_begins(lines: Sequence[bytes], first: int) -> int:
     """Place of the names of a table that begins after other lines: those above rows of numbers, of as many cells.
 
-    `first` where lines before have as many cells as those after, or none are numbers.
+    `first` where it has as many cells as the line below it, of which some are numbers, or where there is no such table.
     """
 
     def cells_of(k: int, mark: bytes) -> list[str]:
@@ -150,7 +152,16 @@ def _table_begins(lines: Sequence[bytes], first: int) -> int:
         cells = [cell for cell in cells_of(k, mark) if cell]
         return bool(cells) and all(re.fullmatch(NUMBER, cell, re.IGNORECASE) for cell in cells)
 
+    def words(k: int, mark: bytes) -> list[str]:
+        cells = cells_of(k, mark)
+        return cells[: max((i + 1 for i, cell in enumerate(cells) if cell), default=0)]  # without what trailing commas make
+
     for mark in (b"\t", b";", b","):
+        below = next((k for k in range(first + 1, len(lines)) if lines[k].strip()), first)
+        head, row = words(first, mark), words(below, mark)
+        number = [bool(re.fullmatch(NUMBER, cell, re.IGNORECASE)) for cell in row if cell]
+        if 1 < len(head) == len(row) and (any(number) or below == first):  # names above values, whatever else is among these
+            return first
         for k in range(first, min(len(lines), MOST_BEFORE) - 2):
             n = size(k, mark)
             if n > 1 and n == size(k + 1, mark) == size(k + 2, mark) and numbers(k + 1, mark) and numbers(k + 2, mark):

@@ -10,7 +10,7 @@ import numpy as np
 
 from idbench.identify.errors import LogError
 from idbench.identify.files.guess_units import FEWEST, with_units
-from idbench.identify.files.layout import UNLOGGED, Asked, LogLayout, Source
+from idbench.identify.files.layout import UNLOGGED, Asked, LogLayout, Source, matching
 from idbench.identify.files.table import LogTable
 
 WORDS = {
@@ -63,13 +63,14 @@ def guess(path: Path, table: LogTable, asked: Asked = Asked()) -> tuple[LogLayou
     told = {"q", "tau"} <= set(asked.columns)
     if table.rows < FEWEST and not told and not table.named:
         raise LogError(f"{path}: {_nameless(table)}")
-    found = _by_names(table) if table.named else LogLayout() if told else _by_values(path, table)
-    found = asked.over(replace(found, joints=() if "q" in asked.columns else found.joints))
+    found = _by_names(table, asked) if table.named else LogLayout() if told else _by_values(path, table)
+    found = asked.over(found)
     missing = [name for name in ("q", "tau") if not getattr(found, name).columns]
     if missing and not (missing == ["q"] and found.qd.columns):  # velocities alone: they are integrated
         what = " and ".join({"q": "positions", "tau": "torques or currents"}[name] for name in missing)
         columns, options = tuple(table.columns), " ".join(f"{name}=..." for name in missing)
         said = f"nothing in {path} looks like {what}; its columns: {', '.join(columns[:40])}; say which: --columns {options}"
+        said += f"; {table.said}" if table.said else ""
         raise UnknownColumnsError(said, found, columns)
     free = not found.t.columns and not found.t.fs
     found = replace(found, samples=found.samples or (free and bool(found.qdd.columns)))
@@ -93,13 +94,13 @@ def _episodes(table: LogTable) -> tuple[dict[str, float], list[str]]:
     for name, column in table.columns.items():
         if name.lower() in EPISODES and column.ndim == 1 and len(values := np.unique(column)) > 1:
             first = float(values[0])
-            return {name: first}, [f"{len(values)} runs by {name}: rows in which it is {first:g} are taken ([rows])"]
+            return {name: first}, [f"{len(values)} runs by {name}: say which, --rows {name}={first:g}"]
     return {}, []
 
 
 def _alike(table: LogTable, found: LogLayout, asked: Asked) -> list[str]:
     """Return doubts about columns that could have been taken in the place of others."""
-    groups, doubts, free = _groups(table), list[str](), not {"q", "tau"} & set(asked.columns)
+    groups, doubts, free = _groups(table), list[str](), not {"q", "tau"} <= set(asked.columns)
     motion = found.q if found.q.columns else found.qd
     every = list(table.columns)
     n, torques = (sum(_entries(table, x) for x in of.names(every)) + of.columns.count(UNLOGGED) for of in (motion, found.tau))
@@ -108,6 +109,7 @@ def _alike(table: LogTable, found: LogLayout, asked: Asked) -> list[str]:
         doubts.append(f"{n} columns of {what} and {torques} of torques: one of each a joint")
     place = {name: place for names in groups.values() for name, place in names}
     q, tau = ([place.get(name, "") for name in source.names(every)] for source in (motion, found.tau))
+    q = list(found.joints) or q
     if free and n == torques == len(q) == len(tau) and set(q) != set(tau):  # columns of several entries have no places
         doubts.append(f"positions are of {', '.join(q)}, torques of {', '.join(tau)}: are these the same joints?")
     if free and all(place.isdigit() for place in q) and q and len(q) <= max(map(int, q)) - min(map(int, q)):
@@ -125,14 +127,21 @@ def _alike(table: LogTable, found: LogLayout, asked: Asked) -> list[str]:
     return doubts
 
 
-def _by_names(table: LogTable) -> LogLayout:
-    """Return a layout by what columns are called."""
-    groups, places = _groups(table), list[str]()
+def _by_names(table: LogTable, asked: Asked) -> LogLayout:
+    """Return a layout by what columns are called, and which are asked for; the others go with these."""
+    every, places = list(table.columns), list[str]()
+    given = {kind: Source(columns).names(every) for kind, columns in asked.columns.items()}
+    taken = {name for names in given.values() for name in names}
+    groups = {key: left for key, names in _groups(table).items() if (left := [one for one in names if one[0] not in taken])}
     found, n = LogLayout(q=Source(), tau=Source()), 0
     for kind in ("t", "q", "tau", "qd", "qdd"):
         choices = {stem: names for (k, stem), names in groups.items() if k == kind}
+        if kind in given:
+            stars = [pair for pattern in asked.columns[kind] if "*" in pattern for pair in matching(pattern, every)]
+            choices = {"": stars or [(name, place_of(name)) for name in given[kind]]}
         if kind == "t":
-            found = replace(found, t=Source((next(iter(choices.values()))[0][0],)) if choices else Source())
+            times = [names[0][0] for names in choices.values() if names]
+            found = replace(found, t=Source((times[0],)) if times else Source())
             continue
         counts = {stem: sum(_entries(table, name) for name, _ in names) for stem, names in choices.items()}
         best = next((stem for stem, count in counts.items() if count == n), None) if n else None
@@ -151,6 +160,12 @@ def _by_names(table: LogTable) -> LogLayout:
         if kind == "tau" and len(names) < n and (of := {place: name for name, place in names}).keys() < set(places):
             found = found.where("tau", Source(tuple(of.get(place, UNLOGGED) for place in places)))
     return found
+
+
+def place_of(name: str) -> str:
+    """Joint, or its number, in a column's name; empty if it has none."""
+    found = _parsed(name)
+    return (found.place or found.number) if found else ""
 
 
 def kind_of(name: str) -> str:

@@ -7,7 +7,7 @@ import numpy as np
 
 from idbench.identify.arrays import Array
 from idbench.identify.files.layout import Asked, LogLayout, Source
-from idbench.identify.files.table import SI, LogTable, factor, named_unit, needs_gain, read_unit
+from idbench.identify.files.table import POSITIONS, SI, LogTable, factor, named_unit, needs_gain, read_unit
 
 FEWEST = 10  # Rows that a guess by values takes
 CURRENTS = ("current", "currents", "cur", "amps")
@@ -21,7 +21,7 @@ STRONGEST = 3e3  # Torques [N m] beyond which mN m are suspected
 def with_units(layout: LogLayout, table: LogTable, asked: Asked) -> tuple[LogLayout, list[str]]:
     """Return a layout with units as asked, by the names of columns, or else by the size of their values, and doubts."""
     doubts = list[str]()
-    for name in ("t", "q", "tau", "qd"):  # velocities last: their unit follows from those before
+    for name in ("t", "q", "tau", "qd", "qdd"):  # velocities last: their unit follows from those before
         source: Source = getattr(layout, name)
         names = [column for column in source.names(list(table.columns)) if column in table.columns]
         if not names or name in asked.units:
@@ -30,7 +30,9 @@ def with_units(layout: LogLayout, table: LogTable, asked: Asked) -> tuple[LogLay
         unit = stated or (_suspected(name, layout, table) if table.rows >= FEWEST else "")
         if name == "q" and not stated and (most := _largest(table, source)) > MOST_DEGREES:
             doubts.append(f"q reaches {most:.5g}: {SAY_UNIT}")
-        elif unit and not stated and unit not in (SI[name], "A"):  # currents are asked for their gain
+        elif (
+            unit and not stated and unit not in (SI[name], "A") and not (layout.samples and name in ("qd", "qdd"))
+        ):  # currents are asked for their gain
             doubts.append(f"{name} in {unit}? Its values, or names, look like it: say --units {name}={unit}, or what it is in")
         layout = layout.where(name, replace(source, unit=unit))
     if not layout.t.columns and not layout.t.fs and not layout.samples:
@@ -47,8 +49,10 @@ def _suspected(quantity: str, layout: LogLayout, table: LogTable) -> str:
         return unit_of_times(table.columns[layout.t.columns[0]])
     if quantity == "q":
         return "deg" if FARTHEST < _largest(table, layout.q) <= MOST_DEGREES else ""
-    if quantity == "qd":
-        return _velocity_unit(table, layout)
+    if quantity in ("qd", "qdd"):
+        if layout.samples:  # of which nothing else is known
+            return f"{layout.q.unit}{'/s' if quantity == 'qd' else '/s^2'}" if layout.q.unit in POSITIONS else ""
+        return _velocity_unit(table, layout) if quantity == "qd" else ""
     if any(word in re.findall("[a-z]+", name.lower()) for name in layout.tau.names(list(table.columns)) for word in CURRENTS):
         return "mA" if _largest(table, layout.tau) > STRONGEST / 10 else "A"
     return "mN m" if _largest(table, layout.tau) > STRONGEST else ""

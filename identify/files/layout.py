@@ -153,7 +153,11 @@ class LogLayout:
         is_square = all(len(row) == len(matrix) for row in matrix)
         if matrix and (not is_square or abs(np.linalg.det(np.array(matrix))) < SINGULAR):
             raise LogError(f"[motors]: matrix = {[list(row) for row in matrix]} must be square and have an inverse")
+        if (t := sources.get("t")) is not None and not t.columns and not t.fs:
+            sources["t"] = replace(t, columns=("t",))
         samples = bool(stated.get("samples", False))
+        if samples:
+            sources.setdefault("q", Source())
         return cls(**sources, samples=samples, joints=tuple(joints), torque=channel, gain=gains, rows=rows, motors=matrix)
 
     def where(self, quantity: str, source: Source) -> Self:
@@ -177,7 +181,7 @@ class LogLayout:
         for name in QUANTITIES:
             source: Source = getattr(self, name)
             if name == "q" and not source.columns:
-                lines += ["", "[q]", "columns = []  # velocities are integrated"]
+                lines += ["", "[q]", f"columns = []  # {'they are 0' if self.samples else 'velocities are integrated'}"]
             elif source != Source():
                 lines += ["", f"[{name}]", *_lines(source, SI[name])]
         lines += ["", "[torque]"]

@@ -13,7 +13,7 @@ from idbench.identify.data.motion_log import TorqueChannel
 from idbench.identify.errors import LogError
 from idbench.identify.files.formats import read_table
 from idbench.identify.files.layout import UNLOGGED, LogLayout, Source, matching
-from idbench.identify.files.table import LogTable, needs_gain
+from idbench.identify.files.table import LogTable, needs_gain, read_unit
 
 CLOCKS = 1e6  # Times [s] beyond this are those of a calendar: logs count from their beginning
 MIN_GAIN, MAX_GAIN = 1e-9, 1e9  # Sizes of gains beyond which they are slips
@@ -36,7 +36,7 @@ class LogFiles:
     def columns(self) -> LogColumns:
         """What they hold."""
         layout = self.layout
-        self._require_once()
+        self.require_once()
         kinds = [name for name in ("q", "qd", "qdd", "tau") if name == "tau" or getattr(layout, name).columns]
         if "q" not in kinds and "qd" not in kinds:
             raise LogError(f"{self.log}: a layout must name columns of q, or of qd, which are then integrated")
@@ -54,6 +54,8 @@ class LogFiles:
             held = [f"column {name} holds {what}" for table in self.tables.values() for name, what in table.words.items()]
             why = "; ".join(held[:3]) or "one of each a joint"
             raise LogError(f"{self.log}: positions of {q.shape[1]} joints and torques of {tau.shape[1]}: {why}")
+        if wrong := next((name for name in ("qd", "qdd") if name in every and every[name].shape != every["q"].shape), None):
+            raise LogError(f"{self.log}: {wrong} is of {every[wrong].shape[1]} joints, positions of {q.shape[1]}: one of each")
         if names and len(names) != q.shape[1]:
             raise LogError(f"{self.log}: {len(names)} names of joints, {q.shape[1]} columns of positions")
         t, t_tau = self.times(layout.q if layout.q.columns else layout.qd, len(q)), self.times(layout.tau, len(tau))
@@ -64,7 +66,7 @@ class LogFiles:
         tau = np.where(np.isin(np.arange(tau.shape[1]), missing), 0.0, tau)
         channel = layout.torque or self._stated()
         gain = np.broadcast_to(self._gain(tau.shape[1]), tau.shape[1:])
-        q, tau, qd = self._of_joints(q, tau * gain, qd)
+        q, tau, qd, qdd = self._of_joints(q, tau * gain, qd, qdd)
         warm = self.of("temperature", layout.temperature)[0] if layout.temperature.columns else None
         gains = tuple(map(float, gain))
         own_times = t_tau - start if other else None
@@ -85,15 +87,17 @@ class LogFiles:
             raise LogError(f"{self.log}: torques of some motors are not there, of which those of joints are made ([motors])")
         return tuple(map(int, none))
 
-    def _of_joints(self, q: Array, tau: Array, qd: Array | None) -> tuple[Array, Array, Array | None]:
-        """Return positions, torques and velocities of joints, where those of motors were logged."""
+    def _of_joints(
+        self, q: Array, tau: Array, qd: Array | None, qdd: Array | None
+    ) -> tuple[Array, Array, Array | None, Array | None]:
+        """Return positions, torques, velocities and accelerations of joints, where those of motors were logged."""
         if not self.layout.motors:
-            return q, tau, qd
+            return q, tau, qd, qdd
         M = np.array(self.layout.motors)
         if len(M) != q.shape[1]:
             raise LogError(f"{self.log}: the matrix of [motors] has {len(M)} rows, the log {q.shape[1]} motors")
         back = np.linalg.inv(M).T
-        return q @ back, tau @ M, None if qd is None else qd @ back
+        return q @ back, tau @ M, None if qd is None else qd @ back, None if qdd is None else qdd @ back
 
     def ordered(self, quantity: str, values: Array, joints: tuple[str, ...], names: tuple[str, ...]) -> Array:
         """Return columns in the order of the joints' names, where they have names themselves."""
@@ -108,8 +112,8 @@ class LogFiles:
         if needs_gain(self.layout.tau.unit) and not gain:
             unit = self.layout.tau.unit
             raise LogError(
-                f"{self.log}: tau is in {unit}, no torque: give the gain of each joint in N m/{unit} with --gain, or as "
-                "gain = [...] in [torque] of its log.toml"
+                f"{self.log}: tau is in {unit}, no torque: give the gain of each joint in N m per {read_unit(unit)} with "
+                "--gain, or as gain = [...] in [torque] of its log.toml"
             )
         if gain and len(gain) not in (1, n):
             raise LogError(f"{self.log}: {len(gain)} gains for {n} joints: give one, or one per joint")
@@ -190,10 +194,13 @@ class LogFiles:
         each = [self.of(quantity, replace(source, file=name))[0] for name, _ in found]
         if len({x.shape for x in each}) > 1:
             raise LogError(f"files {source.file} differ in the number of their rows: {', '.join(str(len(x)) for x in each)}")
+        t = [self._table(self.folder / name).columns.get(x) for name, _ in found for x in self.layout.t.columns[:1]]
+        if not all(x is None or t[0] is None or np.array_equal(x, t[0]) for x in t):
+            raise LogError(f"files {source.file} have times of their own: put them on one clock first")
         places = tuple(place for _, place in found)
         return np.concatenate(each, axis=1), () if any(re.fullmatch(r"\d+", place) for place in places) else places
 
-    def _require_once(self) -> None:
+    def require_once(self) -> None:
         """Raise LogError if a column is named for two quantities or joints."""
         used = dict[tuple[Path, str], str]()
         for quantity in ("t", "q", "qd", "tau", "temperature"):

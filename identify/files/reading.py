@@ -11,7 +11,7 @@ from idbench.identify.files.guess import guess, kind_of
 from idbench.identify.files.guess_units import with_units
 from idbench.identify.files.layout import LAYOUT, UNLOGGED, Asked, LogLayout, Source, own_layout
 from idbench.identify.files.log_files import LogFiles
-from idbench.identify.files.table import SI, LogTable
+from idbench.identify.files.table import SI, LogTable, in_volts
 
 
 def standard_layout(path: Path, table: LogTable) -> LogLayout | None:
@@ -70,12 +70,16 @@ class Understood:
 
     def columns(self) -> LogColumns:
         """What the log holds; raise LogError that asks for what is not known."""
+        self.files.require_once()  # what is wrong, before what is in doubt
         if self.doubts and not self.sure:
             log, words = self.files.log, "; ".join(self.doubts)
             raise LogError(f"{log}: {words}; or correct a layout: idbench log {log} --write makes {own_layout(log)}")
         columns = self.files.columns
         said = [*([self.said] if self.said else []), *self.passed_over]
-        said += ["a model in volts: read V where N m stands; Fs is kS, Fv kV"] * (self.files.layout.tau.unit.upper() == "V")
+        layout = self.files.layout
+        absent = [name for name in ("q", "qd", "qdd") if layout.samples and not getattr(layout, name).columns]
+        said += [f"no {', '.join(absent)}: taken as 0"] if absent else []
+        said += ["a model in volts: read V where N m stands; Fs is kS, Fv kV"] * in_volts(self.files.layout.tau.unit)
         return replace(columns, said="; ".join(said))
 
 
@@ -95,7 +99,7 @@ def understood(path: Path, asked: Asked = Asked(), *, anew: bool = False) -> Und
             raise LogError(f'{path} names no file of the log: add a line such as file = "run.csv" before the tables')
         made = LogFiles(path, path.parent, asked.over(layout))
         first = next(source for source in (layout.q, layout.t, layout.tau) if source.file)
-        return Understood(replace(made, log=made.path_of(first)), said=layout.words(path))
+        return Understood(replace(made, log=made.path_of(first)), said=made.layout.words(path))
     if asked.layout:
         return Understood(LogFiles(path, path.parent, asked.over(asked.layout)))
     found, tables = None if anew else LogLayout.beside(path), dict[Path, LogTable]()
@@ -103,9 +107,10 @@ def understood(path: Path, asked: Asked = Asked(), *, anew: bool = False) -> Und
         tables = {path: read_table(path)}
         found = None if tables[path].torque is not None else found  # what idbench wrote is no log of that folder's recorder
     if found:
-        return Understood(LogFiles(path, found[1].parent, asked.over(found[0]), tables), said=found[0].words(found[1]))
+        layout = asked.over(found[0])
+        return Understood(LogFiles(path, found[1].parent, layout, tables), said=layout.words(found[1]))
     table = tables[path]
-    if standard := standard_layout(path, table):
+    if not {"q", "tau"} & set(asked.columns) and (standard := standard_layout(path, table)):
         layout = asked.over(standard)
         looks = with_units(layout, table, asked)[1] if not table.words else []
         return Understood(LogFiles(path, path.parent, layout, tables), tuple(looks))

@@ -1,6 +1,6 @@
 """ROS bags: messages that hold positions, velocities and efforts of joints, found by their fields."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -29,7 +29,7 @@ class Sample:
     """Time after that of the message [s]."""
 
 
-def _sample(joints: Sequence[str], values: dict[str, Sequence[float]], after: float = 0.0) -> Sample:
+def _sample(joints: Sequence[str], values: Mapping[str, Sequence[float]], after: float = 0.0) -> Sample:
     return Sample(tuple(joints), {name: list(x) for name, x in values.items() if len(x) == len(joints)}, after)
 
 
@@ -45,7 +45,9 @@ def _controllers(message: Any) -> Iterator[Sample]:
 
 def _interfaces(message: Any) -> Iterator[Sample]:
     each = [dict(zip(x.interface_names, x.values, strict=True)) for x in message.interface_values]
-    yield _sample(message.joint_names, {name: [one[name] for one in each if name in one] for name in STATE})
+    driven = [k for k, one in enumerate(each) if {"position", "effort"} <= set(one)]  # others are sensors
+    values = {name: [each[k][name] for k in driven if name in each[k]] for name in STATE}
+    yield _sample([message.joint_names[k] for k in driven], values)
 
 
 def _motors(message: Any) -> Iterator[Sample]:
@@ -145,7 +147,7 @@ class _Topic:
                     message = read(raw, kind)
                 except LookupError:
                     return None
-                has = [all(any(hasattr(message, x) for x in names) for names in fields) for fields, _ in READERS]
+                has = [all(any(_has(message, x) for x in names) for names in fields) for fields, _ in READERS]
                 if True not in has:
                     return None
                 rank = has.index(True)
@@ -161,8 +163,10 @@ class _Topic:
         if not samples:
             return None
         joints, kept, said = of_most_joints([sample.joints for _, sample in samples])
-        some = [samples[k] for k in kept]
-        names = [name for name in some[0][1].values if all(name in sample.values for _, sample in some)]
+        whole = max((tuple(samples[k][1].values) for k in kept), key=len)  # messages without some of it are left out
+        some = [samples[k] for k in kept if tuple(samples[k][1].values) == whole]
+        names, lost = list(whole), len(kept) - len(some)
+        said = "; ".join([*([said] if said else []), *([f"{lost} messages lack one of {', '.join(whole)}"] if lost else [])])
         columns = {name: np.array([sample.values[name] for _, sample in some], dtype=np.float64) for name in names}
         times = np.array([t + sample.after for t, sample in some])
         return cls(rank, joints, times, columns, len(samples) > len(every), said)
@@ -175,6 +179,11 @@ class _Topic:
         if self.several:
             return np.stack([np.interp(states.times, self.times, x) for x in q.T], axis=1)
         return q[np.maximum(np.searchsorted(self.times, states.times + 1e-9, side="right") - 1, 0)]
+
+
+def _has(message: Any, name: str) -> bool:
+    """True if a message has a field, which is no single number."""
+    return not isinstance(getattr(message, name, 0.0), int | float)
 
 
 def _seconds(stamp: Any) -> float:

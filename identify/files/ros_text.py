@@ -12,8 +12,6 @@ from idbench.identify.files.table import LogTable
 NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?|[-+.]*(nan|inf)", re.IGNORECASE)
 STATE = ("position", "velocity", "effort")  # Fields of a JointState, after the names
 
-NO_VALUES = ("name", "time", "ns")
-
 Fields = dict[str, list[int]]
 """Places of the cells of each field."""
 
@@ -27,17 +25,19 @@ def ros_table(lines: Sequence[str]) -> LogTable | None:
     rows = [line.strip().split(",") for line in lines if line.strip()]
     if len(rows) < 2:
         return None
-    fields = _by_header(rows[0]) if rows[0][0] == "%time" else _by_cells(max(rows, key=len))
+    header = rows[0][0] == "%time"
+    fields = _by_header(rows[0]) if header else _by_cells(max(rows, key=len))
     if fields is None or "name" not in fields:
         return None
-    rows = rows[1:] if rows[0][0] == "%time" else rows
+    rows = rows[1:] if header else rows
     width = max(map(len, rows))
+    fields = _widened(fields, width, len(lines[0].split(","))) if header else fields
     named = [tuple(row[k] for k in fields["name"]) if len(row) == width else () for row in rows]
     joints, places, said = of_most_joints(named)
     kept = [rows[k] for k in places]
     columns = {"t": _times(kept, fields)}
     for name, places in fields.items():
-        if name not in NO_VALUES and len(places) == len(joints):
+        if name not in ("name", "time", "ns") and len(places) == len(joints):
             columns[name] = np.array([[float(row[k] or "nan") for k in places] for row in kept])
     return LogTable(columns, entries={name: joints for name in columns if name != "t"}, said=said)
 
@@ -51,6 +51,17 @@ def _by_header(cells: Sequence[str]) -> Fields:
         elif match := re.fullmatch(r"field\.(.*\D)(\d+)", cell):
             fields.setdefault("name" if match[1] in ("name", "joint_names") else match[1], []).append(k)
     return fields
+
+
+def _widened(fields: Fields, width: int, of_header: int) -> Fields:
+    """Places of fields in rows of more joints than the header has, which is that of the first message."""
+    groups = [name for name in fields if name not in ("time", "ns")]
+    n, first = len(fields["name"]), min(k for name in groups for k in fields[name])
+    each, left = divmod(width - first, len(groups))
+    if width == of_header or left or first + n * len(groups) != of_header:
+        return fields
+    places = (list(range(first + i * each, first + (i + 1) * each)) for i in range(len(groups)))
+    return {"time": fields["time"], **dict(zip(groups, places, strict=True))}
 
 
 def _by_cells(cells: Sequence[str]) -> Fields | None:

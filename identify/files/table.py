@@ -91,19 +91,25 @@ def _parts(unit: str) -> tuple[str, float, float]:
 
 def needs_gain(unit: str) -> bool:
     """True if an effort in this unit is no torque."""
-    return _plain(unit) in [_plain(name) for name in NEED_GAIN]
+    name, size, _ = _parts(unit)
+    return not size and _plain(name) in map(_plain, NEED_GAIN)
+
+
+def in_volts(unit: str) -> bool:
+    """True if an effort in this unit is in volts, and so is a model of it."""
+    return _plain(_parts(unit)[0]) == "V"
 
 
 def read_unit(unit: str) -> str:
     """Unit in which efforts are that need a gain: mA are read as A."""
-    return next(read for name, read in NEED_GAIN.items() if _plain(name) == _plain(unit))
+    return next(read for name, read in NEED_GAIN.items() if _plain(name) == _plain(_parts(unit)[0]))
 
 
 def named_unit(quantity: str, column: str) -> str:
     """Return the unit that the name of a column ends with, as "q1 [deg]" or tau1_mNm does; empty if it has none."""
     found = re.search(r"[\[(]([^\])]+)[\])]\s*$|_([A-Za-z]+)$", column)
     text = _plain(next((part for part in found.groups() if part), "")) if found else ""
-    return next((name for name in UNITS[quantity] if text and _plain(name) == text), "")
+    return next((name for name in UNITS[quantity] if text != "1" and text and _plain(name) == text), "")
 
 
 def _plain(unit: str) -> str:

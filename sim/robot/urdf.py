@@ -66,11 +66,11 @@ def _tidied(root: ElementTree.Element) -> Iterator[str]:
                 if child.tag in ONCE and child.tag in tags[:k]:
                     element.remove(child)
                     yield f"a second {child.tag} of {owner.get('name')}: the first one is taken"
-    known = {link.get("name") for link in root.iter("link")}
-    for name in dict.fromkeys(link_of(joint, "parent") for joint in root.iter("joint")):
-        if name and name not in known:
-            root.insert(0, ElementTree.Element("link", name=name))
-            yield f"no link {name}, the parent of a joint: it is taken as the ground"
+    known, moved = {link.get("name") for link in root.iter("link")}, {link_of(joint, "child") for joint in root.iter("joint")}
+    unknown = {link_of(joint, "parent") for joint in root.iter("joint")} - known
+    if len(unknown) == 1 and known <= moved:  # else a name is wrong, and the robot would be cut in two
+        root.insert(0, ElementTree.Element("link", name=(name := unknown.pop())))
+        yield f"no link {name}, the parent of a joint: it is taken as the ground"
 
 
 def _rotors(root: ElementTree.Element) -> Iterator[tuple[str, float]]:

@@ -49,6 +49,7 @@ def test_a_table_of_velocities_and_torques_is_a_law_of_friction(tmp_path, idbenc
         log=(tmp_path / "table.csv",), robot="two_link", torque="instantaneous", reading=ColumnOptions(samples=True)
     )
     fit = identified(asked)
+    assert judge(fit).good
     found = dict(zip(fit.estimates["explicit"].names, fit.estimates["explicit"].X, strict=True))
     assert [found[x] for x in ("Fv1", "Fs1", "Fv2", "Fs2")] == pytest.approx([3.0, 0.7, 1.5, 0.4], rel=1e-6)
 

@@ -296,3 +296,52 @@ def test_positions_in_other_units_are_asked_for_and_read(named, unit, size, zero
 def test_units_that_are_none_are_refused(units, complaint):
     with pytest.raises(SettingError, match=complaint):
         Asked(units=units)
+
+
+@pytest.mark.parametrize("unit", ["A@0.02", "mA@2", "%@1", "permille@3"])
+def test_a_zero_makes_no_torque_of_a_current(named, unit):
+    with pytest.raises(LogError, match="say its gain"):
+        read_columns(named, Asked(units={"tau": unit}))
+
+
+def test_columns_that_are_asked_for_give_the_others_their_order(tmp_path):
+    names = ["time", "x_elbow", "x_lift", "effort_lift", "effort_elbow", "speed_elbow", "speed_lift"]
+    path = saved(tmp_path / "order.csv", names, np.c_[T, Q[:, [1, 0]], TAU[:, :2], QD[:, [1, 0]]])
+    found = read_columns(path, Asked(columns={"q": ("x_*",)}))
+    place = [found.joints.index(name) for name in ("lift", "elbow")]
+    for values, expected in ((found.q, Q[:, :2]), (found.qd, QD[:, :2]), (found.tau, TAU[:, :2])):
+        np.testing.assert_allclose(values[:, place], expected)
+    one = read_columns(path, Asked(columns={"q": ("x_lift",), "tau": ("effort_lift",)}))
+    np.testing.assert_allclose(one.q, Q[:, :1])
+    assert one.qd is None
+
+
+@pytest.mark.parametrize("first", ["NA", "IDLE", ""])
+def test_names_are_kept_above_rows_with_words(first, tmp_path):
+    rows = [f"{t},{q},{tau},{first if k < 3 else 0.5}" for k, (t, q, tau) in enumerate(zip(T, Q[:, 0], TAU[:, 0], strict=True))]
+    (tmp_path / "log.csv").write_text("\n".join(["time,position_a,effort_a,mode", *rows]) + "\n")
+    found = read_columns(tmp_path / "log.csv")
+    np.testing.assert_allclose(found.q[:, 0], Q[:, 0])
+
+
+def test_a_gripper_that_printed_first_is_left_out(tmp_path):
+    fields = ("name", "position", "velocity", "effort")
+    lines = [",".join(["%time,field.header.seq,field.header.stamp,field.header.frame_id", *(f"field.{x}0" for x in fields)])]
+    for k, (t, *values) in enumerate(zip(T, Q, QD, TAU, strict=True)):
+        stamp = f"{round(1e9 * t)},{k},{1_700_000_000_000_000_000 + round(1e9 * t)},"
+        lines += [f"{stamp},finger,0.0,0.0,0.0"] * (k % 10 == 0)
+        lines.append(",".join([stamp, *ARM, *(repr(float(x)) for each in values for x in each)]))
+    (tmp_path / "log.csv").write_text("\n".join(lines) + "\n")
+    found = read_columns(tmp_path / "log.csv")
+    assert found.joints == ARM
+    assert "10 messages" in found.said
+    np.testing.assert_allclose(found.tau, TAU, atol=1e-9)
+
+
+def test_samples_have_the_units_of_their_positions_or_of_their_names(tmp_path):
+    degrees = 180 / np.pi
+    names = ["q_a", "qd_a", "acc_a [deg/s^2]", "tau_a"]
+    path = saved(tmp_path / "samples.csv", names, np.c_[degrees * Q[:, 0], degrees * QD[:, 0], degrees * Q[:, 1], TAU[:, 0]])
+    found = read_columns(path, Asked(units={"q": "deg"}))
+    for values, expected in ((found.q, Q[:, 0]), (found.qd, QD[:, 0]), (found.qdd, Q[:, 1])):
+        np.testing.assert_allclose(values[:, 0], expected)

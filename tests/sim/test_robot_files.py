@@ -60,6 +60,8 @@ def test_what_is_there_twice_or_not_declared_reads_as_elsewhere(load_urdf):
     assert twice.model.body_pos[-1].tolist() == once.model.body_pos[-1].tolist() == [0, 0, 0.3]
     assert any("a second origin of j1: the first one is taken" in note for note in twice.notes)
     assert any("no link l0" in note for note in once.notes)
+    with pytest.raises(RobotError):  # a typo, which would cut the robot in two
+        load_urdf(urdf("", SOLID, SOLID).replace('parent link="l1"', 'parent link="L1"'))
 
 
 def test_a_link_whose_mass_is_welded_to_it_is_left_alone(load_urdf):

@@ -77,7 +77,7 @@ def _understood(options: ShowLog) -> tuple[Understood, LogColumns]:
         raise ExperimentError(f"{error}: {own_layout(options.log)} is one to correct") from error
     layout = found.files.layout
     if not layout.t.columns and not layout.t.fs and not layout.samples:
-        raise ExperimentError(f"{path}: {found.doubts[-1]}")
+        raise ExperimentError(f"{path}: {'; '.join(found.doubts)}")
     raw = needs_gain(layout.tau.unit) and not layout.gain
     return found, replace(found.files, layout=replace(layout, gain=(1.0,)) if raw else layout).columns
 
@@ -134,6 +134,8 @@ def resample(options: Resample) -> None:
         raise ExperimentError(f"--out {out}: {LAYOUT} there would be taken for its columns: choose another folder, or .parquet")
     require_free(out, "--out", force=options.force, read=read)
     columns, page = read_columns(options.log, asked_of(options.reading)), Page()
+    if columns.qdd is not None:
+        raise ExperimentError(f"{options.log} is of samples by themselves, which have no clock to repair")
     meaning = options.torque or (columns.torque.meaning if columns.torque else None)
     if meaning is None:
         raise ExperimentError(f"{options.log} does not say what its torque means: add --torque held, instantaneous or averaged")
