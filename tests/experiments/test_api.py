@@ -249,7 +249,7 @@ def test_an_object_has_the_name_of_the_table_where_it_is_one():
 )
 def test_wrong_types_are_told_in_one_line(files, call, complaint):
     log = idbench.read_log(files / "first.parquet")
-    with pytest.raises(ValueError, match=complaint) as found:
+    with pytest.raises((idbench.ExperimentError, idbench.IdentificationError, idbench.BenchError), match=complaint) as found:
         call(log, idbench.fit(log, model="explicit", estimator="OLS"))
     assert "\n" not in str(found.value)
 
