@@ -12,7 +12,6 @@ from idbench.identify.files.formats import FORMATS
 from idbench.identify.files.table import LogTable
 
 SCALARS = "Scalars:scalars"
-OURS = ("q/measured", "torque/log")  # What a recording of idbench shows of a log
 WRITING = ("log_time", "log_tick")  # Timelines of when something was written, not of when it was
 
 
@@ -27,6 +26,8 @@ def read_recording(path: Path) -> LogTable:
         If it cannot be read, or has no scalars in time.
     """
     from rerun.chunk import RrdReader
+
+    from idbench.experiments.recording.motion_layer import LOGGED
 
     try:
         stores = (reader := RrdReader(path)).recordings()
@@ -56,8 +57,8 @@ def read_recording(path: Path) -> LogTable:
             found.setdefault(name.strip("/"), []).append((ns, np.array(rows, dtype=np.float64)))
     if not found:
         raise LogError(f"{path} is a recording without scalars in time: record positions and torques, or name the log itself")
-    if set(OURS) <= set(found):  # beside these, our recordings have what was simulated, and what models make of it
-        found = {name: found[name] for name in OURS}
+    if set(found) >= LOGGED:  # beside these, our recordings have what was simulated, and what models make of it
+        found = {name: found[name] for name in LOGGED}
     joined = {name: [np.concatenate(x) for x in zip(*parts, strict=True)] for name, parts in found.items()}
     common = Counter(ns.tobytes() for ns, _ in joined.values()).most_common(1)[0][0]
     every = np.frombuffer(common, dtype=np.int64)

@@ -9,6 +9,7 @@ import numpy as np
 
 from idbench.identify.arrays import Array
 from idbench.identify.data.motion_log import MotionLog, TorqueChannel
+from idbench.identify.errors import LogError
 from idbench.identify.models import torque_rows
 from idbench.identify.noise.covariance import BandedCovariance, Whitening
 from idbench.identify.noise.linearization import Linearization
@@ -26,6 +27,15 @@ if TYPE_CHECKING:
 
 
 DELAY_STEP = 1e-4  # Half the difference of delays [s]: small beside a sample, large beside the rounding of an interpolation
+
+
+def require_logs(logs: Sequence[object]) -> None:
+    """Raise LogError unless all are logs, of which there is one at least."""
+    if not logs:
+        raise LogError("there is no log to identify")
+    for log in logs:
+        if not isinstance(log, MotionLog):
+            raise LogError(f"{log!r:.60} is given where a MotionLog is needed, such as read_log(path)")
 
 
 @dataclass(frozen=True, eq=False)

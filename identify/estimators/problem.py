@@ -12,7 +12,7 @@ from idbench.identify.arrays import Array
 from idbench.identify.basis.basis import Basis
 from idbench.identify.data.motion_log import MotionLog
 from idbench.identify.errors import IdentificationError, LogError
-from idbench.identify.estimators.log_rows import LogRows, Piece, bias_counts, pieces
+from idbench.identify.estimators.log_rows import LogRows, Piece, bias_counts, pieces, require_logs
 from idbench.identify.estimators.simulator import Simulation
 from idbench.identify.models import AbstractModel, ExplicitModel
 from idbench.identify.noise.propagation import NoiseLevels
@@ -27,19 +27,12 @@ from idbench.identify.signals.signals import Signals
 ROUNDING = 1e-9  # Share by which frequencies may differ that are the same: of a file they are the mean of its steps
 
 
-def require_logs(logs: Sequence[object]) -> None:
-    """Raise LogError unless all are logs, of which there is one at least."""
-    if not logs:
-        raise LogError("there is no log to identify")
-    for log in logs:
-        if not isinstance(log, MotionLog):
-            raise LogError(f"{log!r:.60} is given where a MotionLog is needed, such as read_log(path)")
-
-
 Reduced = TypeVar("Reduced")
 
 SAMPLED = 8  # Pieces of long logs from which noise is estimated and propagated
-SURE = 2.0  # Times that residuals must allow the noise that differences show for its likelihood not to be asked
+SURE = (
+    2.0  # Times that residuals must allow the noise that differences show: a level from some hundred rows is known to a tenth
+)
 BEGIN, LEAST = (1.0, 0.1, 0.1), 1e-4  # Shares of the errors of rows of which one kind is not alike, to begin with, and at least
 
 
@@ -120,11 +113,10 @@ class Problem:
 
     def every_part(self) -> Iterator[LogRows]:
         """Yield the rows of each log, or of every piece of long ones."""
-        if not self.long:
+        if self.long:
+            yield from (LogRows(ref(self), chain.signals(log.part(*piece))) for chain, log, piece in self._pieces)
+        else:
             yield from self.parts
-            return
-        for chain, log, piece in self._pieces:
-            yield LogRows(ref(self), chain.signals(log.part(*piece)))
 
     @cached_property
     def share(self) -> float:
@@ -135,9 +127,8 @@ class Problem:
     @cached_property
     def position_noise(self) -> Array:
         """Noise of the positions [rad], shape (..., joint): from their differences, at least that of an encoder's count."""
-        if self.explicit is not self:
-            return self.explicit.position_noise
-        return np.maximum(white_noise(self.signals, "q"), count_noise(self.logs))
+        other = self.explicit
+        return other.position_noise if other is not self else np.maximum(white_noise(self.signals, "q"), count_noise(self.logs))
 
     @cached_property
     def repeats(self) -> Array:
@@ -206,9 +197,8 @@ class Problem:
         least = least_level(rms_torque([part.noisy for part in self.parts]), self._resolution)
         if (self._residual_level() <= least).all():
             return least
-        positions = NoiseLevels(np.zeros_like(least), self.position_noise, self.repeats)
-        plenty = (SURE * shown <= self._residual_level(positions)).all()
-        return shown if plenty else self.likely_noise.torque
+        of_positions = NoiseLevels(np.zeros_like(least), self.position_noise, self.repeats)
+        return shown if (SURE * shown <= self._residual_level(of_positions)).all() else self.likely_noise.torque
 
     def _residual_level(self, others: NoiseLevels | None = None) -> Array:
         rows, noisy = zip(*((part.rows, part.noisy) for part in self.parts), strict=True)
@@ -220,8 +210,8 @@ class Problem:
         if self.explicit is not self:
             return self.explicit.likely_noise
         rows, noisy = zip(*((part.unbiased, part.noisy) for part in self.parts), strict=True)
-        begin = NoiseLevels(self._residual_level(), self.position_noise, self.repeats)
-        return likely_levels(rows, noisy, begin, self._resolution)
+        levels = NoiseLevels(self._residual_level(), self.position_noise, self.repeats)
+        return likely_levels(rows, noisy, levels, self._resolution)
 
     @cached_property
     def _resolution(self) -> Array:
@@ -278,9 +268,8 @@ class Problem:
 
     def with_model(self, model: AbstractModel) -> "Problem":
         """Return the problem of another model, which shares all that the two have in common."""
-        if isinstance(model, ExplicitModel):
-            return self.explicit
-        return replace(self, model=model, _signals=self.signals, _explicit=self.explicit)
+        of_explicit = isinstance(model, ExplicitModel)
+        return self.explicit if of_explicit else replace(self, model=model, _signals=self.signals, _explicit=self.explicit)
 
     def with_basis(self, basis: Basis) -> Self:
         """Return the problem of another basis, such as one with other nonlinear parameters; signals are shared."""

@@ -7,7 +7,7 @@ import numpy as np
 
 from idbench.identify.arrays import Array
 from idbench.identify.files.layout import Asked, LogLayout, Source
-from idbench.identify.files.table import POSITIONS, SI, LogTable, factor, named_unit, needs_gain, read_unit
+from idbench.identify.files.table import POSITIONS, SI, LogTable, factor, gain_wanted, named_unit, needs_gain
 
 FEWEST = 10  # Rows that a guess by values takes
 CURRENTS = ("current", "currents", "cur", "amps")
@@ -38,8 +38,7 @@ def with_units(layout: LogLayout, table: LogTable, asked: Asked) -> tuple[LogLay
     if not layout.t.columns and not layout.t.fs and not layout.samples:
         doubts.append("it has no column of times that idbench recognises: say which with --columns t=NAME, or state fs in [t]")
     if needs_gain(layout.tau.unit) and not layout.gain:
-        unit = read_unit(layout.tau.unit)
-        doubts.append(f"tau is in {layout.tau.unit}: say its gain, --gain N m per {unit} of each joint, gears included")
+        doubts.append(gain_wanted(layout.tau.unit))
     return layout, doubts
 
 

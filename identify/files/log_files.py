@@ -13,7 +13,7 @@ from idbench.identify.data.motion_log import TorqueChannel
 from idbench.identify.errors import LogError
 from idbench.identify.files.formats import read_table
 from idbench.identify.files.layout import UNLOGGED, LogLayout, Source, matching
-from idbench.identify.files.table import LogTable, needs_gain, read_unit
+from idbench.identify.files.table import LogTable, gain_wanted, needs_gain
 
 CLOCKS = 1e6  # Times [s] beyond this are those of a calendar: logs count from their beginning
 MIN_GAIN, MAX_GAIN = 1e-9, 1e9  # Sizes of gains beyond which they are slips
@@ -110,11 +110,7 @@ class LogFiles:
     def _gain(self, n: int) -> Array:
         gain = self.layout.gain
         if needs_gain(self.layout.tau.unit) and not gain:
-            unit = self.layout.tau.unit
-            raise LogError(
-                f"{self.log}: tau is in {unit}, no torque: give the gain of each joint in N m per {read_unit(unit)} with "
-                "--gain, or as gain = [...] in [torque] of its log.toml"
-            )
+            raise LogError(f"{self.log}: {gain_wanted(self.layout.tau.unit)}; or as gain = [...] in [torque] of its log.toml")
         if gain and len(gain) not in (1, n):
             raise LogError(f"{self.log}: {len(gain)} gains for {n} joints: give one, or one per joint")
         if wrong := [x for x in gain if not MIN_GAIN <= abs(x) <= MAX_GAIN]:

@@ -84,7 +84,7 @@ class Understood:
 
 
 def understood(path: Path, asked: Asked = Asked(), *, anew: bool = False) -> Understood:  # noqa: B008  # frozen
-    """Return what is understood of a log: by the layout beside it (not `anew`), by names of idbench's, or a guess.
+    """Layout of a log and its doubts: by the file beside it (not `anew`), by the names of idbench's columns, or a guess.
 
     Raises
     ------
@@ -115,7 +115,7 @@ def understood(path: Path, asked: Asked = Asked(), *, anew: bool = False) -> Und
         looks = with_units(layout, table, asked)[1] if not table.words else []
         return Understood(LogFiles(path, path.parent, layout, tables), tuple(looks))
     layout, doubts = guess(path, table, asked)
-    sources = ((name, getattr(layout, name)) for name in ("t", "q", "qd", "tau"))
+    sources = ((name, getattr(layout, name)) for name in ("t", "q", "qd", "qdd", "tau"))
     words = "; ".join(f"{name} [{of.unit or SI[name]}] = {', '.join(of.columns)}" for name, of in sources if of.columns)
     return Understood(LogFiles(path, path.parent, layout, tables), tuple(doubts), False, f"columns by their names: {words}")
 

@@ -140,22 +140,16 @@ class _Topic:
     @classmethod
     def of(cls, messages: Iterator[tuple[int, Any]], read: Callable[[Any, str], Any], kind: str) -> "_Topic | None":
         """Return the joints' samples of messages; None if they have none, or of a kind that the bag does not describe."""
-        every, rank = list[tuple[int, Any]](), -1
-        for stamp, raw in messages:
-            if not every:
-                try:
-                    message = read(raw, kind)
-                except LookupError:
-                    return None
-                has = [all(any(_has(message, x) for x in names) for names in fields) for fields, _ in READERS]
-                if True not in has:
-                    return None
-                rank = has.index(True)
-                every.append((stamp, message))
-                continue
-            every.append((stamp, read(raw, kind)))
-        if not every:
+        stamp, raw = next(messages, (0, None))
+        try:
+            first = None if raw is None else read(raw, kind)
+        except LookupError:
             return None
+        fields = {x for x in dir(first) if not isinstance(getattr(first, x), int | float)}  # no single numbers
+        rank = next((k for k, (wanted, _) in enumerate(READERS) if all(fields & set(names) for names in wanted)), None)
+        if rank is None:  # the others, perhaps of cameras, are not read
+            return None
+        every = [(stamp, first), *((stamp, read(raw, kind)) for stamp, raw in messages)]
         headers = [getattr(message, "header", None) for _, message in every]
         stamps = np.array([_seconds(header.stamp) if header else 0.0 for header in headers])
         stamps = stamps if stamps.any() else 1e-9 * np.array([stamp for stamp, _ in every], dtype=np.float64)
@@ -179,11 +173,6 @@ class _Topic:
         if self.several:
             return np.stack([np.interp(states.times, self.times, x) for x in q.T], axis=1)
         return q[np.maximum(np.searchsorted(self.times, states.times + 1e-9, side="right") - 1, 0)]
-
-
-def _has(message: Any, name: str) -> bool:
-    """True if a message has a field, which is no single number."""
-    return not isinstance(getattr(message, name, 0.0), int | float)
 
 
 def _seconds(stamp: Any) -> float:

@@ -95,6 +95,11 @@ def needs_gain(unit: str) -> bool:
     return not size and _plain(name) in map(_plain, NEED_GAIN)
 
 
+def gain_wanted(unit: str) -> str:
+    """Question for the gain of efforts in a unit."""
+    return f"tau is in {unit}, no torque: say its gain, --gain N m per {read_unit(unit)} of each joint, gears included"
+
+
 def in_volts(unit: str) -> bool:
     """True if an effort in this unit is in volts, and so is a model of it."""
     return _plain(_parts(unit)[0]) == "V"

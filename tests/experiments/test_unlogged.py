@@ -5,14 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from idbench.experiments.exports.exports import origin
 from idbench.experiments.identification.job import identified
-from idbench.experiments.judgement.judgement import judge
+from idbench.experiments.judgement.judgement import conclusion, judge
 from idbench.experiments.requests.jobs import IdentifyRequest
 from idbench.identify import LogError, MotionLog, TorqueChannel
 from idbench.identify.files.log_file import CSV, read_log, write_log
 from idbench.identify.files.reading import read_columns
+from idbench.sim.engine.run import ideal_log
 from idbench.sim.robot.inverse_dynamics import coulomb_torque, inverse_dynamics
 from idbench.sim.robot.robot import Robot
+from idbench.sim.trajectories import RandomMoves, Reference
 
 LAST = 5
 """Joint of the PUMA whose torque is missing."""
@@ -246,3 +249,16 @@ def test_a_log_of_ten_hertz_gets_a_band_of_its_own(tmp_path):
     found, truth = fit.estimates["explicit"], fit.robot_model.truth(fit.robot_model.robot)
     z = (found.X - [truth[name] for name in found.names]) / found.standard_errors
     assert np.mean(np.abs(z) < 2) > 0.8  # 95 % expected, of some 36 that are correlated
+
+
+def test_joints_that_never_moved_are_named_in_the_verdict_and_in_files(tmp_path):
+    robot, rng = Robot.load("puma560"), np.random.default_rng(3)
+    moves = RandomMoves(moves=10, durations=(0.8, 1.2), velocity=(2.0,), rest=0.2).sample(robot, 200.0)
+    moving = np.arange(robot.n) < 3
+    q, qd, qdd = (np.where(moving, x, still) for x, still in ((moves.q, 0.1), (moves.qd, 0.0), (moves.qdd, 0.0)))
+    log = ideal_log(robot, Reference(200.0, q, qd, qdd))
+    write_log(replace(log, tau=log.tau + 0.05 * rng.normal(size=log.tau.shape)), tmp_path / "half.parquet")
+    fit = identified(IdentifyRequest(log=(tmp_path / "half.parquet",), robot="puma560", model="explicit"))
+    assert fit.still == ["joint4", "joint5", "joint6"]
+    assert "NOTHING IS KNOWN of joint4, joint5, joint6, which never moved" in origin(fit, "explicit")
+    assert "nothing is known of joint4, joint5, joint6: no motion" in conclusion(judge(fit), {}).finding

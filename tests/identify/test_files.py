@@ -132,7 +132,7 @@ def test_currents_ask_for_a_gain(tmp_path):
     text(path, ["t", *(f"q{j}" for j in (1, 2, 3)), *(f"current_{j}" for j in (1, 2, 3))], [T, Q, TAU / 5])
     layout = understood(path).files.layout
     assert layout.tau.unit == "A"
-    with pytest.raises(LogError, match=r"tau is in A, no torque: give the gain"):
+    with pytest.raises(LogError, match=r"tau is in A, no torque: say its gain"):
         read_columns(path, Asked(layout))
     np.testing.assert_allclose(read_columns(path, Asked(replace(layout, gain=(5.0,)))).tau, TAU)
     with pytest.raises(LogError, match="2 gains for 3 joints"):

@@ -260,7 +260,7 @@ def test_options_change_what_they_name_and_names_hold(named, asked, q, tau):
 
 
 def test_what_is_missing_is_asked_for_with_the_layout_that_may_say_it(named):
-    with pytest.raises(LogError, match=r"tau is in A: say its gain, --gain N m per A.*--write makes .*named\.toml"):
+    with pytest.raises(LogError, match=r"tau is in A, no torque: say its gain, --gain N m per A.*--write makes .*named\.toml"):
         read_columns(named)
 
 

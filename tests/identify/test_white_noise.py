@@ -1,11 +1,15 @@
 """Errors of counts that a periodic motion repeats, and sigma on moves and Fourier series where counts are the only noise."""
 
+from dataclasses import replace
+
 import exact_scara
 import numpy as np
 import pytest
 
-from idbench.identify import MODELS, MotionLog, TorqueChannel, identify, scara
-from idbench.identify.noise.white_noise import repeats
+from idbench.identify import CHAINS, MODELS, MotionLog, Problem, TorqueChannel, identify, scara
+from idbench.identify.noise.white_noise import count_noise, repeats, torque_noise
+from idbench.sim import load_scenario
+from idbench.sim.engine.simulation import simulate
 
 FS, SECONDS = 100.0, 40.0
 T = np.arange(0, SECONDS, 1 / FS)
@@ -89,3 +93,28 @@ def test_sigma_of_counts_alone_holds_the_truth(motion, bits, truth):
     assert np.sqrt(np.mean(z**2)) == pytest.approx(1.0, abs=0.3 if blurred else 0.1)
     assert (0.88 if blurred else 0.93) < np.mean(np.abs(z) < 2) < 0.98
     assert np.mean(np.abs(found.X - truth) < 2 * found.standard_errors) > (0.90 if blurred else 0.93)
+
+
+@pytest.mark.parametrize(
+    ("name", "lines", "asked"),
+    [
+        ("ideal", None, False),
+        ("ripple", None, False),
+        ("ripple", 65536, False),
+        ("saturation", 4096, False),
+        ("stribeck", 65536, True),
+        ("quantization", None, True),
+        ("gain", None, True),
+    ],
+)
+def test_where_the_likelihood_is_not_asked_it_would_not_decide(name, lines, asked):
+    """The noise is the lesser of what differences show and what makes rows likely, on logs of MuJoCo with ripples, other
+    friction, wrong gains, encoders; computed here for all, by the product where it decides."""
+    scenario = load_scenario(name)
+    if lines:
+        scenario = replace(scenario, encoder=replace(load_scenario("quantization").encoder, lines=lines))
+    problem = Problem((simulate(scenario).alone(),), scara(), MODELS.create("explicit"), CHAINS.create("idbench"))
+    found = problem.noise.torque
+    assert ("likely_noise" in problem.__dict__) == asked
+    lesser = np.minimum(torque_noise(problem.signals), problem.likely_noise.torque)
+    np.testing.assert_allclose(found, np.maximum(lesser, count_noise(problem.logs, "tau")), rtol=1e-9)

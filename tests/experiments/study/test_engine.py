@@ -3,6 +3,8 @@
 import os
 import signal
 import time
+from concurrent.futures import Future
+from types import SimpleNamespace
 
 import pytest
 from distributed import LocalCluster
@@ -12,7 +14,7 @@ from idbench.experiments.errors import StudyError
 from idbench.experiments.study import cluster
 from idbench.experiments.study.cluster import cluster_pool, compute, versions
 from idbench.experiments.study.job import compare_again, local_pool, run_missing
-from idbench.experiments.study.shard import run_shard
+from idbench.experiments.study.shard import Shard, run_shard
 from idbench.experiments.study.store import Store
 from idbench.experiments.study.study_file import study_from
 
@@ -131,6 +133,8 @@ def test_a_study_leaves_the_threads_of_the_libraries_as_they_were(small, tmp_pat
 CODE = """
 import sys
 import time
+from concurrent.futures import Future
+from types import SimpleNamespace
 from pathlib import Path
 from idbench.experiments.study.job import local_pool, run_missing
 from idbench.experiments.study.store import Store
@@ -178,3 +182,39 @@ def test_a_killed_worker_costs_only_time(small, tmp_path, undisturbed):
         run_missing(store, pool, 2, watch)
         assert killed[0] not in pool._client.run(os.getpid).values()
     assert store.table().equals(undisturbed)
+
+
+class _Timed:
+    """A pool whose shards are done at once, and say that every run took so many seconds."""
+
+    width = 1
+
+    def __init__(self, seconds):
+        self.seconds, self.sizes = seconds, []
+
+    def submit(self, runs):
+        self.sizes.append(len(runs))
+        done = Future()
+        done.set_result(Shard([], {"simulation": self.seconds * len(runs)}))
+        return done
+
+    def partial(self):
+        return 0.0
+
+
+@pytest.mark.parametrize(("seconds", "expected"), [(1.0, 10), (100.0, 1), (0.001, 64)])
+def test_shards_begin_small_and_take_some_ten_seconds(seconds, expected):
+    """What an interruption loses is in seconds, whatever a run takes; `shard` is the most."""
+    pool, todo = _Timed(seconds), range(1000)
+
+    def missing(size):
+        start = 0
+        while start < len(todo):
+            yield range(start, end := min(start + size(), len(todo)))
+            start = end
+
+    store = SimpleNamespace(missing=missing, write=lambda runs, shard: None)
+    run_missing(store, pool, 64, lambda done: None)
+    assert pool.sizes[0] == 8
+    assert set(pool.sizes[3:-1]) == {expected}
+    assert sum(pool.sizes) == len(todo)
