@@ -99,17 +99,17 @@ def run_missing(
     """Run what a study lacks, in shards of at most `shard` runs; what is finished when this is interrupted is kept.
 
     Shards begin small, and are as long as some `KEPT` seconds take, so that an interruption loses no more.
-
     `watch` receives how many runs of this call are done, parts of shards included; `finished_shard` the runs of every shard
     when it is kept.
     """
-    size = min(shard, FIRST)
-    todo = store.missing(lambda: size)
+    size, left = min(shard, FIRST), sum(map(len, store.missing(shard)))
+    todo = store.missing(lambda: max(1, min(size, ceil(left / (2 * pool.width)))))  # short ones at the end: all end together
     pending = dict[Future[Shard], range]()
     done = 0
     while True:
         while len(pending) < 2 * pool.width and (runs := next(todo, None)) is not None:
             pending[pool.submit(runs)] = runs
+            left -= len(runs)
         if not pending:
             return
         finished, _ = wait(pending, timeout=POLL, return_when=FIRST_COMPLETED)
