@@ -229,11 +229,10 @@ def said_of(columns: Sequence[str], units: Sequence[str], rows: Sequence[str], k
     """What texts NAME=VALUE say of the columns of `known` quantities, of their units and of rows."""
     found = list[dict[str, str]]()
     for option, texts in (("columns", columns), ("units", units)):
-        each = {name: value for name, _, value in (text.partition("=") for text in texts)}
-        if wrong := next((name for name, value in each.items() if name not in known or not value), None):
+        if wrong := [text for text in texts if text.partition("=")[0] not in known or not text.partition("=")[2]]:
             some = ", ".join(f"{name}=..." for name in known)
-            raise ExperimentError(f"--{option} {wrong}={each[wrong]}: give {some}, such as q=position_*")
-        found.append(each)
+            raise ExperimentError(f"--{option} {wrong[0]}: give {some}, such as q=position_*")
+        found.append({name: value for name, _, value in (text.partition("=") for text in texts)})
     try:
         conditions = {name: float(value) for name, _, value in (text.partition("=") for text in rows)}
     except ValueError:
