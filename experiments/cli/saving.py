@@ -1,6 +1,6 @@
 """Results that are complete: shown and saved, all of them, before anything that only shows them."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -27,11 +27,12 @@ def folder_of(options: Any, out: Path, experiment: str = "") -> ResultsFolder:
     return folder
 
 
-def require_target(option: str, path: Path, ending: str, *, force: bool, read: Read = ()) -> None:
-    """Raise ExperimentError if a further file that is asked for cannot be written there; before the work, not after it."""
-    if path.suffix != ending:
-        raise ExperimentError(f"{option} {path}: its name must end with {ending}")
-    require_free(path, option, force=force, read=read)
+def require_targets(paths: Sequence[Path], endings: Collection[str], *, force: bool, read: Read = ()) -> None:
+    """Raise ExperimentError if further files that are asked for cannot be written there; before the work, not after it."""
+    for path in paths:
+        if path.suffix not in endings:
+            raise ExperimentError(f"--write {path}: its name must end with {', '.join(endings)}")
+        require_free(path, "--write", force=force, read=read)
 
 
 @contextmanager

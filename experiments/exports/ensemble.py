@@ -20,7 +20,7 @@ from idbench.sim.errors import BenchError
 from idbench.sim.robot.rewrite import rewritten
 from idbench.sim.robot.robot import Robot
 from idbench.sim.robot.tree import standard_parameters
-from idbench.sim.robot.varied import DRIVE, model_fields
+from idbench.sim.robot.varied import model_fields
 
 DRAWS, ROUGH = 200, 50
 """Robots that are drawn, and of those that only say how far apart all must be: their scatter is then known to a tenth."""
@@ -36,9 +36,6 @@ LEVEL, NORMAL = 0.95, 1.96
 SETTLED = 2  # Samples at the beginning of a run that do not count: there the position is that of the log
 MOST = 4_000_000  # Values of torques that are drawn at once: 30 MB
 
-USUAL = 0.2
-"""Share by which parameters are often varied where nothing is known of them, as in the published randomizations of robots."""
-
 
 @dataclass(frozen=True, eq=False)
 class FreeRuns:
@@ -52,8 +49,6 @@ class FreeRuns:
     """Of the band [rad], shape (run, time, joint)."""
     high: Array
     """Of the band [rad]."""
-    usual: Array
-    """Width of the band of parameters that are varied by `USUAL`, at the end of runs [rad], shape (joint,)."""
     diverged: float = 0.0
     """Share of the runs of single robots that diverged, and have no part in the band."""
 
@@ -71,11 +66,9 @@ class FreeRuns:
     def words(self, joints: tuple[str, ...]) -> str:
         """Findings in words."""
         every, worst = float(self.held.mean()), int(self.held.argmin())
-        narrower = float(np.median(self.width / np.maximum(self.usual, 1e-12)))
         said = (
             f"free runs of {LENGTH:g} s from {DRAWS} robots hold {100 * every:.1f} % of the instants of {self.title} "
-            f"({joints[worst]} {100 * self.held[worst]:.0f} %); the band is {narrower:.2g} times as wide as that of parameters "
-            f"+-{100 * USUAL:.0f} %"
+            f"({joints[worst]} {100 * self.held[worst]:.0f} %)"
         )
         said += f"; {100 * self.diverged:.2g} % of the runs diverged" if self.diverged else ""
         return said if every >= LEVEL - 0.02 else f"{said}: less than {100 * LEVEL:.0f} %, the model lacks something there"
@@ -151,15 +144,13 @@ class Ensemble:
             with stage(f"free runs of {held.title}"):
                 try:
                     q, found = self._runs(held, self.standard, self.spread, rng)
-                    _, usual = self._runs(held, self._usual(rng), 0.0, rng)
                 except (BenchError, IdentificationError):
                     continue
             tails = [(1 - LEVEL) / 2, (1 + LEVEL) / 2]
             gone = ~np.asarray(np.isfinite(found).all(axis=(2, 3)), dtype=np.bool_)
             found[gone.all(axis=1)] = np.inf  # a run in which all diverge holds nothing
             low, high = np.nanquantile(found, tails, axis=1)
-            ends = np.nanquantile(usual[:, :, -1], tails, axis=1)
-            bands.append(FreeRuns(held.title, q, low, high, np.asarray((ends[1] - ends[0]).mean(axis=0)), float(gone.mean())))
+            bands.append(FreeRuns(held.title, q, low, high, float(gone.mean())))
         return bands
 
     def _drawn(self, draws: int, spread: float, rng: np.random.Generator) -> dict[str, Array]:
@@ -172,17 +163,6 @@ class Ensemble:
         each = dict(zip(robot_model.grouping.standard.names, drawn_about(robot_model, estimate, deviations).T, strict=True))
         equal: Mapping[str, Any] = robot_model.equal(each)
         return {name: np.broadcast_to(np.asarray(x, dtype=np.float64), (draws,)) for name, x in equal.items()}
-
-    def _usual(self, rng: np.random.Generator) -> dict[str, Array]:
-        """Return robots whose links, rotors and frictions are varied one by one by `USUAL`."""
-        found = dict[str, Array]()
-        scale: dict[tuple[str, int | None], Array] = {}
-        for p in self.fit.robot_model.grouping.standard.parameters:
-            what = p.symbol if p.symbol in DRIVE else "link"
-            if (what, p.joint) not in scale:
-                scale[what, p.joint] = rng.uniform(1 - USUAL, 1 + USUAL, ROUGH)
-            found[p.name] = np.median(self.standard[p.name]) * scale[what, p.joint]
-        return found
 
     @cached_property
     def _residuals(self) -> list[tuple[Array, Array]]:
@@ -219,7 +199,7 @@ class Ensemble:
             begin = np.repeat(some, draws)
             noise = size * rng.standard_normal((2, len(begin), log.n))
             states = log.q[begin] + noise[0], qd[begin] + gain * noise[1]
-            disturbance = spread * self._unexplained(log, (len(begin), samples, log.n), rng) if spread else None
+            disturbance = spread * self._unexplained(log, (len(begin), samples, log.n), rng)
             varied = {name: np.tile(x, (len(some), *[1] * (x.ndim - 1))) for name, x in fields.items()}
             runs = shoot(robot, varied, states, log, begin, samples, disturbance)
             found.append(runs.reshape(len(some), draws, samples, log.n))

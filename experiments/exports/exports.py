@@ -109,26 +109,22 @@ def _turned(written: WrittenRobot) -> list[str]:
 def actuators(fit: Fit, model: str, path: Path) -> Exported:
     """What a training framework asks of each joint's actuator, as YAML, with standard errors."""
     written, robot = WrittenRobot(fit, model), fit.robot_model.robot
-    estimate = fit.estimates[model]
-    basis, errors = estimate.problem.basis, estimate.standard_errors
-    sigma = {p.name: float(errors[place]) for p, place in basis.places.items()}  # of those that are tied, too
     most, known = robot.most("velocity"), standard_parameters(robot)
     lines = [
         f"# {fit.robot_model.tree.name}: {', '.join(fit.logs.names)}, {model} model, idbench {version('idbench')}.",
         "# armature [kg m^2], frictionloss [N m], damping [N m s/rad]; of slides kg, N, N s/m. null: not known.",
+        "# from: log; sum: a share of what the log shows, as near to the robot's file as that allows; stated; file.",
         "joints:",
     ]
     for j, joint in enumerate(robot.joints):
         lines.append(f"  {json.dumps(joint)}:")
         for key, letters in (("armature", "Ia"), ("frictionloss", "Fs"), ("damping", "Fv")):
             name = named(letters, j)
-            value = written.values.get(name, known.get(name, 0.0))
-            lines += [f"    {key}: {_or_null(value)}", f"    {key}_sigma: {_or_null(sigma.get(name))}"]
+            value, sigma = written.values.get(name, known.get(name, 0.0)), written.sigma.get(name)
+            found = {key: _or_null(value), f"{key}_sigma": _or_null(sigma), f"{key}_from": written.source(name)}
+            lines += [f"    {what}: {x}" for what, x in found.items()]
         lines += [f"    effort_limit: {_or_null(robot.torque_limits[j])}", f"    velocity_limit: {_or_null(most[j])}"]
-    rotors = [name for j in range(robot.n) if written.values.get(name := named("Ia", j))]
-    grouped = [name for name in rotors if name not in sigma and name not in fit.robot_model.held]
-    aside = [f"{', '.join(grouped)}: grouped with inertias of links, the file's share of them is kept"] if grouped else []
-    return Exported({path: "\n".join(lines) + "\n"}, [*written.warnings, *aside])
+    return Exported({path: "\n".join(lines) + "\n"}, written.warnings)
 
 
 def _or_null(x: float | None) -> str:
@@ -248,21 +244,14 @@ def c_source(fit: Fit, model: str, path: Path) -> Exported:
     return Exported({path.with_suffix(end): x for end, x in c_texts(_content(fit, model, path), path).items()})
 
 
-def ensemble(fit: Fit, model: str, path: Path) -> Exported:
-    """Return robots drawn from what the estimate leaves open, in a folder."""
+def drawn(fit: Fit, model: str, path: Path) -> Exported:
+    """Return robots drawn from what the estimate leaves open: in a folder, or as data, with code that takes them."""
+    from idbench.experiments.exports import ranges
     from idbench.experiments.exports.ensemble import ensemble_of, notes, robot_texts
 
-    drawn = ensemble_of(fit, model)
-    return Exported(robot_texts(drawn, path), WrittenRobot(fit, model).warnings, notes(drawn))
-
-
-def training_ranges(fit: Fit, model: str, path: Path) -> Exported:
-    """Return ranges of what the estimate leaves open, and code that takes them."""
-    from idbench.experiments.exports import ranges
-    from idbench.experiments.exports.ensemble import ensemble_of, notes
-
-    drawn = ensemble_of(fit, model)
-    return Exported(ranges.texts(drawn, path), WrittenRobot(fit, model).warnings, notes(drawn))
+    robots = ensemble_of(fit, model)
+    texts = robot_texts(robots, path) if path.suffix == FOLDER else ranges.texts(robots, path)
+    return Exported(texts, WrittenRobot(fit, model).warnings, notes(robots))
 
 
 def _content(fit: Fit, model: str, path: Path) -> Content:
@@ -293,7 +282,7 @@ EXPORTS: dict[str, FileKind] = {
     ".json": FileKind("base parameters and regressor", base_parameters, lambda *_: None),
     ".py": FileKind("dynamics and regressors in Python", python_module, require_functions),
     ".c": FileKind("dynamics and regressors in C, with their header,", c_source, require_functions, (".h",)),
-    ".toml": FileKind("ranges, with code for training,", training_ranges, require_written_back, CODE),
-    FOLDER: FileKind("robots drawn from what is not known", ensemble, require_written_back),
+    ".toml": FileKind("robots drawn from what is not known, with code for training,", drawn, require_written_back, CODE),
+    FOLDER: FileKind("robots drawn from what is not known", drawn, require_written_back),
 }
 """What is written, by the ending of its name."""

@@ -1,5 +1,6 @@
-"""Ranges of an ensemble: a file of means, sigma, quantiles and correlations, and code for training frameworks."""
+"""Robots of an ensemble as data, values and ranges of what is known of them one by one, and code for training frameworks."""
 
+import json
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -8,30 +9,33 @@ import numpy as np
 import tomli_w
 
 from idbench.experiments.exports.code import template
-from idbench.experiments.exports.ensemble import DRAWS, LENGTH, Ensemble, FreeRuns, fields_of
+from idbench.experiments.exports.ensemble import DRAWS, LENGTH, NORMAL, Ensemble, FreeRuns, fields_of
+from idbench.experiments.identification.consistent_robot import WrittenRobot
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.reports.panels import Panel, stacked
-from idbench.identify import Array
-from idbench.identify.arrays import TINY
+from idbench.identify.basis.block import named
 
 CODE = ("_mjlab.py", "_isaaclab.py", "_playground.py")  # Endings of the names of code for training frameworks
 PICTURE = "_band.svg"  # Ending of the name of the picture of the band
-QUANTILES = {"low": 0.025, "middle": 0.5, "high": 0.975}
-"""The middle of a value, and the ends of the range that holds 95 % of the robots."""
+DIGITS = 9  # Significant digits: two more than the single precision of training frameworks
 
-DIGITS = 6  # Significant digits: draws scatter by far more
+JOINT = {"armature": ("Ia", "dof_armature"), "damping": ("Fv", "dof_damping"), "frictionloss": ("Fs", "dof_frictionloss")}
+"""What a joint has -> letters of the parameter, and MuJoCo's field."""
 
-JOINT = {"armature": "dof_armature", "damping": "dof_damping", "frictionloss": "dof_frictionloss"}
-"""What a joint has -> MuJoCo's field."""
+BODY = {"mass": "body_mass", "com": "body_ipos", "inertia": "body_inertia", "quat": "body_iquat"}
+"""What a body has -> MuJoCo's field."""
+
+ALONE = 0.8
+"""Share of the variance of a parameter that the others leave, from which on it has a range of its own: what is drawn one by one
+then errs by an eighth more than sigma says at most."""
 
 
 def texts(ensemble: Ensemble, path: Path) -> dict[Path, str]:
-    """Return the texts of the ranges, and of the code that takes them, by their paths."""
-    table = ranges(ensemble)
+    """Return the texts of the robots and ranges, and of the code that takes them, by their paths."""
     about = f"{ensemble.fit.robot_model.tree.name}, identified by idbench {version('idbench')}"
-    made = {path: tomli_w.dumps(table)}
+    made = {path: tomli_w.dumps(table_of(ensemble)) + _robots(ensemble)}
     for ending in CODE:
-        text = template(f"ranges{ending}").substitute(about=about, draws=DRAWS, tables=_tables(table))
+        text = template(f"ranges{ending}").substitute(about=about, draws=DRAWS, file=path.name)
         made[path.with_name(path.stem + ending)] = text
     if ensemble.bands:
         made[path.with_name(path.stem + PICTURE)] = picture(ensemble.bands[0], ensemble.fit.robot_model)
@@ -44,9 +48,7 @@ def picture(runs: FreeRuns, robot_model: RobotModel) -> str:
     count, samples, _ = runs.q.shape
     time = LENGTH * (np.arange(count)[:, None] + np.arange(samples) / samples)
     for j, (joint, held) in enumerate(zip(robot_model.robot.joints, runs.held, strict=True)):
-        panel = Panel(
-            f"{joint}: {100 * held:.0f} % of the instants held, width {runs.width[j]:.2g} (+-20 %: {runs.usual[j]:.2g})"
-        )
+        panel = Panel(f"{joint}: {100 * held:.0f} % of the instants held, width {runs.width[j]:.2g}")
         for edge, label in ((runs.low, "95 % of the robots"), (runs.high, "")):
             off = edge[..., j] - runs.q[..., j]
             off[:, 0] = np.nan  # no line from the end of a run to the next
@@ -57,33 +59,23 @@ def picture(runs: FreeRuns, robot_model: RobotModel) -> str:
     return stacked(panels, 1.5, "time of free runs [s]", f"robots - log [{', '.join(sorted(units))}]")
 
 
-def ranges(ensemble: Ensemble) -> dict[str, Any]:
-    """Return mean, sigma and quantiles of the values of joints and bodies, and how these are correlated."""
+def table_of(ensemble: Ensemble) -> dict[str, Any]:
+    """Return the value, sigma and range of what joints have, masses of bodies, and how well free runs hold the logs."""
+    written = WrittenRobot(ensemble.fit, ensemble.model)
     robot = ensemble.fit.robot_model.robot
-    fields = fields_of(robot, ensemble.standard)
+    mass = {int(body): named("M", j) for j, body in enumerate(robot.model.jnt_bodyid[: robot.n])}
     sizes, times = ensemble.disturbance
     joints: dict[str, Any] = {}
-    bodies: dict[str, Any] = {}
-    columns: dict[str, Array] = {}
     for j, joint in enumerate(robot.joints):
-        own = {name: fields[field][:, j] for name, field in JOINT.items()}
-        columns |= {f"{joint}.{name}": x for name, x in own.items()}
-        joints[joint] = {name: _told(x) for name, x in own.items()}
+        joints[joint] = {what: _value(ensemble, written, named(letters, j)) for what, (letters, _) in JOINT.items()}
         joints[joint]["disturbance"] = {"rms": _short(sizes[j]), "correlation_time": _short(times[j])}
-    for k in sorted({int(body) for body in robot.model.jnt_bodyid[: robot.n]}):
-        body = robot.model.body(k).name or f"body{k}"
-        own = {"mass": fields["body_mass"][:, k]}
-        own |= {f"com_{x}": fields["body_ipos"][:, k, i] for i, x in enumerate("xyz")}
-        own |= {f"inertia_{i + 1}": fields["body_inertia"][:, k, i] for i in range(3)}
-        columns |= {f"{body}.{name}": x for name, x in own.items()}
-        bodies[body] = {name: _told(x) for name, x in own.items()}
-    varied = {name: x for name, x in columns.items() if np.ptp(x) > 1e-9 * np.abs(x).max(initial=TINY)}
-    matrix = np.atleast_2d(np.corrcoef(np.stack(list(varied.values())))) if varied else np.empty((0, 0))
     return {
         "about": (
-            f"{DRAWS} physically consistent robots, seed {ensemble.seed}. Units: kg, m, kg m^2, N m, N m s/rad (slides: N, "
-            "N s/m); com and principal inertias in the frame of MuJoCo's body; disturbance: torque that the model does not "
-            "explain [N m] and the time over which it is alike [s]."
+            f"[[robots]]: {DRAWS} physically consistent robots (seed {ensemble.seed}): armature, damping, frictionloss of "
+            "[joints]; mass, com, principal inertia and its quat (w x y z) of [bodies]. Take one of them, whole. Units: "
+            "kg, m, kg m^2, N m, N m s/rad (slides: N, N s/m). from: log, with sigma, and a range of 95 % where others do "
+            "not depend on it; sum: a share of what the log shows, as near to the robot's file as that allows; stated; "
+            "file. disturbance: torque that the model does not explain [N m] and the time over which it is alike [s]."
         ),
         "spread": _short(ensemble.spread),
         "free_run": LENGTH,
@@ -92,30 +84,49 @@ def ranges(ensemble: Ensemble) -> dict[str, Any]:
                 "on": band.title,
                 "held": dict(zip(robot.joints, map(_short, band.held), strict=True)),
                 "width": dict(zip(robot.joints, map(_short, band.width), strict=True)),
-                "width_of_20_percent": dict(zip(robot.joints, map(_short, band.usual), strict=True)),
             }
             for band in ensemble.bands
         ],
         "joints": joints,
-        "bodies": bodies,
-        "correlations": {"of": list(varied), "matrix": [[round(float(x), 3) for x in row] for row in matrix]},
+        "bodies": {name: {"mass": _value(ensemble, written, mass.get(k, ""))} for name, k in bodies_of(ensemble).items()},
     }
 
 
-def _told(x: Array) -> dict[str, float]:
-    moments = {"mean": _short(x.mean()), "sigma": _short(x.std())}
-    return moments | {name: _short(np.quantile(x, share)) for name, share in QUANTILES.items()}
+def bodies_of(ensemble: Ensemble) -> dict[str, int]:
+    """Return the numbers of MuJoCo's bodies that joints move, and of those that are welded to them, by their names."""
+    robot = ensemble.fit.robot_model.robot
+    links, model = set(robot.model.jnt_bodyid[: robot.n].tolist()), robot.model
+    return {model.body(k).name or f"body{k}": k for k in range(1, model.nbody) if int(model.body_weldid[k]) in links}
+
+
+def _value(ensemble: Ensemble, written: WrittenRobot, name: str) -> dict[str, Any]:
+    value = written.values.get(name, 0.0)
+    found: dict[str, Any] = {"value": _short(value), "from": written.source(name)}
+    if name not in written.sigma:
+        return found
+    problem, sigma = ensemble.estimate.problem, ensemble.spread * written.sigma[name]
+    place = next(k for p, k in problem.basis.places.items() if p.name == name)
+    C = ensemble.estimate.covariance
+    found["sigma"] = _short(sigma)
+    if 1 / (C[place, place] * np.linalg.inv(C)[place, place]) >= ALONE:
+        found |= {"low": _short(max(value - NORMAL * sigma, 0.0)), "high": _short(value + NORMAL * sigma)}
+    return found
+
+
+def _robots(ensemble: Ensemble) -> str:
+    """Return the robots, a line for each of their values: a table that is written out has 20 000."""
+    robot, bodies = ensemble.fit.robot_model.robot, list(bodies_of(ensemble).values())
+    fields = fields_of(robot, ensemble.standard)
+    columns = {what: fields[field][:, : robot.n] for what, (_, field) in JOINT.items()}
+    columns |= {what: fields[field][:, bodies] for what, field in BODY.items()}
+    rounded = {what: [json.dumps(_rounded(own)) for own in values] for what, values in columns.items()}
+    each = ("\n".join(f"{what} = {own[k]}" for what, own in rounded.items()) for k in range(DRAWS))
+    return "".join(f"\n[[robots]]\n{lines}\n" for lines in each)
+
+
+def _rounded(values: Any) -> Any:
+    return [_rounded(x) for x in values] if np.ndim(values) else _short(values)
 
 
 def _short(x: Any) -> float:
     return float(f"{float(x):.{DIGITS}g}")
-
-
-def _tables(table: dict[str, Any]) -> str:
-    """Return the ranges of values of joints and bodies, as code."""
-    texts = []
-    for value, part in {**dict.fromkeys(JOINT, "joints"), "mass": "bodies"}.items():
-        ends = {name: (own[value]["low"], own[value]["high"]) for name, own in table[part].items()}
-        rows = "".join(f"    {name!r}: {low_high},\n" for name, low_high in ends.items())
-        texts.append(f"{value.upper()} = {{\n{rows}}}\n")
-    return "\n".join(texts)

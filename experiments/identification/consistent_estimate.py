@@ -8,20 +8,16 @@ from idbench.experiments.identification.robot_model import RobotModel
 from idbench.identify import Array, Consistent, Estimate, consistent_parameters
 from idbench.identify.arrays import TINY
 from idbench.identify.parameters.bodies import exist
-from idbench.identify.parameters.consistent import NEAR, least_change
+from idbench.identify.parameters.consistent import least_change
 from idbench.identify.telling import stage
-
-HELD_NEAR = 1.0
-"""What a step to twice the robot costs one that is drawn [squared sigma]: a prior of that width. A millionth lets rotors
-and links that are grouped share their sum in any way, by 40 %; a hundred holds back 4 sigma of what is known."""
 
 SURE = 0.1  # Sigma of what was left out, as a share of the least of the others
 
 
-def consistent_of(robot_model: RobotModel, estimate: Estimate, weight: float = NEAR, near: Array | None = None) -> Consistent:
+def consistent_of(robot_model: RobotModel, estimate: Estimate, near: Array | None = None) -> Consistent:
     """Return the physically consistent standard parameters that agree best with an estimate, near the file's, or others."""
     X, C = _of_all(robot_model, estimate)
-    return consistent_parameters(robot_model.grouping, X, C, robot_model.filed if near is None else near, weight=weight)
+    return consistent_parameters(robot_model.grouping, X, C, robot_model.filed if near is None else near)
 
 
 def drawn_about(robot_model: RobotModel, estimate: Estimate, deviations: Array) -> Array:
@@ -30,7 +26,7 @@ def drawn_about(robot_model: RobotModel, estimate: Estimate, deviations: Array) 
     They move as little as they can, as shares of themselves: so what no deviation moves stays, and only a robot that could not
     exist is made consistent by itself.
     """
-    grouping, middle = robot_model.grouping, consistent_of(robot_model, estimate, HELD_NEAR).standard
+    grouping, middle = robot_model.grouping, consistent_of(robot_model, estimate).standard
     place, K = _places(robot_model, estimate), grouping.K[_places(robot_model, estimate)]
     sigma = np.sqrt(np.maximum(np.diagonal(estimate.covariance), TINY))
     size = np.maximum(np.abs(middle), least_change(K, sigma))
@@ -42,7 +38,7 @@ def drawn_about(robot_model: RobotModel, estimate: Estimate, deviations: Array) 
         if not exist(grouping.standard.parameters, own):
             with stage(f"robot {k + 1} of {len(found)}"):
                 off = replace(estimate, X=estimate.X + deviations[k])
-                found[k] = consistent_of(robot_model, off, HELD_NEAR, middle).standard
+                found[k] = consistent_of(robot_model, off, middle).standard
     return found
 
 

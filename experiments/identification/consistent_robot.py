@@ -10,11 +10,12 @@ import numpy as np
 from idbench.experiments.identification.consistent_estimate import consistent_of
 from idbench.experiments.identification.fit import Fit
 from idbench.identify import Array, Consistent
-from idbench.identify.basis.block import FRICTION
+from idbench.identify.basis.block import FRICTION, named
 from idbench.sim.robot.rewrite import compiled, rewritten
 from idbench.sim.robot.robot import Robot
 
 LITTLE = 0.1  # Differences of torques of less than so many per cent are not named
+MUCH = 2.0  # Times the mass of the file, or a share of it, beyond which a link is named: CAD is off by a third at most
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +37,31 @@ class WrittenRobot:
         """The standard parameters by name; those that were not asked for are zero."""
         found, robot_model = self.consistent, self.fit.robot_model
         return robot_model.equal(dict(zip(found.names, map(float, found.standard), strict=True)))
+
+    @cached_property
+    def sigma(self) -> dict[str, float]:
+        """Standard errors of the parameters that the log shows by themselves, in no sum with others."""
+        estimate = self.fit.estimates[self.model]
+        places = estimate.problem.basis.places.items()  # of those that are tied, too
+        return {p.name: float(estimate.standard_errors[k]) for p, k in places if p.name in self.values}
+
+    def source(self, name: str) -> str:
+        """Whether a value is of the log, a share of a sum that the log shows, stated, or of the file."""
+        if name in self.sigma or name not in self.consistent.names:
+            return "log" if name in self.sigma else "stated" if name in self.values else "file"
+        return "sum" if self.fit.robot_model.grouping.K[:, self.consistent.names.index(name)].any() else "file"
+
+    @cached_property
+    def strayed(self) -> list[str]:
+        """Links whose mass is far from the file's."""
+        found, joints = self.consistent, self.fit.robot_model.robot.joints
+        places = [(found.names.index(name), joint) for j, joint in enumerate(joints) if (name := named("M", j)) in found.names]
+        pairs = [(joint, found.standard[k], found.given[k]) for k, joint in places]
+        return [
+            f"the link of {joint} has {mass:.3g} kg, {of_file:.3g} in the robot's file"
+            for joint, mass, of_file in pairs
+            if not of_file / MUCH <= mass <= MUCH * of_file
+        ]
 
     def text(self, folder: Path | None = None) -> str:
         """Return the file, to stand in a folder; in that of the robot's own file by default."""

@@ -20,7 +20,7 @@ from idbench.sim.scenario.measurement import Ripple, TorqueMeasurement
 from idbench.sim.scenario.scenario import Scenario
 from idbench.sim.trajectories import Reference
 
-IMPOSSIBLE = "; if the loop is right, the parameters are not physically consistent: start from a file of --write-mjcf"
+IMPOSSIBLE = "; if the loop is right, the parameters are not physically consistent: start from a file of --write"
 """What else it may be."""
 
 SAME = 1e-6  # Share by which frequencies that are the same differ at most

@@ -8,6 +8,7 @@ import numpy as np
 
 from idbench.experiments.errors import is_told, reason, trace
 from idbench.experiments.identification.causes import Cause, remedy_of
+from idbench.experiments.identification.consistent_robot import WrittenRobot
 from idbench.experiments.identification.fit import Fit
 from idbench.experiments.identification.log_warnings import JUMPS
 from idbench.experiments.identification.robot_model import ASSUMED
@@ -146,7 +147,8 @@ def _finding(judgement: Judgement, causes: Sequence[Cause]) -> str:
     off = f"torque errors of at most {error_percentage(worst)}{noisy}"
     found = f"Result: {verdict.word} ({model} model), {off} on {one.title.finding}"
     seen = _power(judgement.fit) if verdict.word == "good" and not causes else []
-    return "; ".join([found, *(cause.words for cause in causes[:1]), *seen])
+    far = [] if verdict.word == "poor" or causes else WrittenRobot(judgement.fit, model).strayed
+    return "; ".join([found, *(cause.words for cause in causes[:1]), *seen, *far])
 
 
 def _power(fit: Fit) -> Iterator[str]:

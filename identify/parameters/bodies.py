@@ -58,6 +58,8 @@ SMALL = 0.01
 """Share of the robot's mean mass below which a given body says nothing of the real one, and one of that share of the mean body
 takes its place: a file may have a flange of a milligram where a tool of a kilogram is."""
 
+UNKNOWN = 1e-6  # Weight of the logarithm that keeps rotors above zero that a file lacks: they take what is constant at a joint
+
 LEAST = 1e-8  # Share of the trace of a link's pseudo-inertia that its least eigenvalue is raised to
 
 
@@ -103,6 +105,8 @@ class Bodies:
         for link, S in zip(self.links, inertias, strict=True):
             self.given[link] = inertial(S)
         self.given[self._signed] = np.maximum(given[self._signed], size[self._signed])
+        absent = [parameters[i].kind == "rotor inertia" and not given[i] for i in self._signed]
+        self._weight = np.where(absent, UNKNOWN, 1.0)
 
     def with_extent(self, x: Array) -> Array:
         """Return parameters of links with some extent in every direction, as simulators ask: `LEAST` of the trace."""
@@ -138,9 +142,10 @@ class Bodies:
         ratio, free = x[self._signed] / self.given[self._signed], (x - self.given)[self._free] / self._size[self._free]
         if (ratio <= 0).any():
             return None
-        value += float(np.sum(ratio - np.log(ratio) - 1) + np.sum(free**2) / 2)
-        gradient[self._signed] = (1 - 1 / ratio) / self.given[self._signed]
-        root[self._signed, self._signed] = x[self._signed]
+        there, weight = self._weight == 1.0, self._weight
+        value += float(np.sum(weight * (there * (ratio - 1) - np.log(ratio))) + np.sum(free**2) / 2)
+        gradient[self._signed] = weight * (there - 1 / ratio) / self.given[self._signed]
+        root[self._signed, self._signed] = x[self._signed] / np.sqrt(weight)
         gradient[self._free] = free / self._size[self._free]
         root[self._free, self._free] = self._size[self._free]
         return Divergence(value, gradient, root)

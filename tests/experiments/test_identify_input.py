@@ -75,10 +75,10 @@ def test_a_file_that_cannot_be_written_costs_nothing_else(idbench, logs, monkeyp
         raise IdentificationError("link 2 cannot exist")
 
     monkeypatch.setattr("idbench.experiments.identification.consistent_estimate.consistent_parameters", impossible)
-    words = "--write-mjcf", "out.xml", "--out", "found", "--no-rerun"
+    words = "--write", "out.xml", "--out", "found", "--no-rerun"
     code, out, err = idbench("identify", logs / "first.parquet", *NEEDED, *words)
     assert code == 2
-    assert "--write-mjcf out.xml: link 2 cannot exist; the estimates are printed, and with the logs in found" in err
+    assert "--write out.xml: link 2 cannot exist; the estimates are printed, and with the logs in found" in err
     assert "Ia6  " in out
     assert "written to found" in out
 

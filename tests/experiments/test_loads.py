@@ -159,7 +159,7 @@ PAIR = "full.parquet --unloaded empty.parquet --robot puma560 --estimator WLS --
 
 
 def test_the_payload_command(files, ran):
-    out, _, summary = ran("payload", PAIR, "--write-mjcf arm.xml")
+    out, _, summary = ran("payload", PAIR, "--write arm.xml")
     mass = re.search(r"the nearest physically consistent body: ([\d.]+) kg", out)
     assert float(mass[1]) == pytest.approx(2.0, rel=0.01)
     robot = Robot.load(str(files / "arm.xml"))

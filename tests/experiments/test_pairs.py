@@ -37,7 +37,7 @@ OPTIONS = {
     "coupling": [NONE, "--coupling m=joint1+joint2"],
     "gravity": [NONE, "--gravity 0 0 -9.81"],
     "validate": [NONE, "--validate second.csv"],
-    "write": [NONE, "--write arm.json", "--write arm.py", "--write arm.urdf", "--write-mjcf arm.xml"],
+    "write": [NONE, "--write arm.json", "--write arm.py", "--write arm.urdf", "--write arm.xml"],
     "out": [NONE, "--out found"],
     "rerun": ["--no-rerun", NONE],
     "json": [NONE, "--json"],

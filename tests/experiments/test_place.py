@@ -220,7 +220,7 @@ def test_the_robot_of_a_run_that_is_identified_is_not_replaced(tmp_path, complai
     own = tmp_path / "arm.xml"
     own.write_text(Robot.path("scara").read_text())
     assert main(["run", "ideal", "--robot", str(own), "--no-rerun", "--out", str(tmp_path / "run")]) == 0
-    words = "identify", str(tmp_path / "run"), "--force", "--write-mjcf", str(own)
+    words = "identify", str(tmp_path / "run"), "--force", "--write", str(own)
     assert "is a file that this command reads" in complaint(*words)
     assert own.read_text() == Robot.path("scara").read_text()
 

@@ -23,7 +23,7 @@ def test_robot_tells_what_can_be_identified(ran):
 
 @pytest.mark.thorough
 def test_identify_validates_and_writes_the_file(ran, logs, tmp_path):
-    words = "--robot puma560 --write-mjcf out.xml --out results --no-rerun -v --validate"
+    words = "--robot puma560 --write out.xml --out results --no-rerun -v --validate"
     out, _, summary = ran("identify", logs / "first.parquet", words, logs / "second.parquet")
     assert "explicit: good: the torque of joint" in out
     assert "at rest and reversing, where friction is not determined: joint1" in out
@@ -85,7 +85,7 @@ def test_joints_by_name_are_put_in_order_and_unknown_ones_refused(idbench, ran, 
 def test_the_closed_form_is_written_too(ran, tmp_path):
     """ZZR1 ... of the paper are base parameters of the links: bodies that have them are found."""
     ran("run ideal --no-rerun --out mine")
-    ran("identify mine/log.parquet --write-mjcf out.xml")
+    ran("identify mine/log.parquet --write out.xml")
     made = standard_parameters(Robot.load(str(tmp_path / "out.xml")))
     assert made["ZZ1"] + made["Ia1"] + 0.25 * made["M2"] == pytest.approx(3.5, rel=1e-3)
     assert 0.5 * made["MX2"] == pytest.approx(0.12, rel=1e-2)
@@ -98,7 +98,7 @@ def test_a_file_without_motors_ranges_and_room_is_described_simulated_and_judged
         out = ran(f"run {name}.toml --robot arm.xml --out {name} --no-rerun").out
         assert "has no motors (dcmotor elements of MJCF): its drives are ideal" in out
     assert f"--robot {arm}" in ran("export first").out
-    words = "--validate second --write-mjcf out.xml --model explicit --out found --no-rerun"
+    words = "--validate second --write out.xml --model explicit --out found --no-rerun"
     out, _, summary = ran("identify first", words)
     assert out.startswith("Result: good (explicit model)")
     assert max(summary["validation"]["models"]["explicit"]["position_error_rms"]) < 1e-3
@@ -109,7 +109,7 @@ def test_an_offset_is_no_error_of_the_simulated_robot(ran, changed):
     path = changed(tau=lambda tau: tau + [5, -8, 4, 1, -1, 0.5])
     words = "identify", path, "--robot puma560 --model explicit"
     assert "with --add offset the worst joint's error falls from" in ran(*words).out
-    out, _, summary = ran(*words, "--add offset --out found --no-rerun --write-mjcf out.xml")
+    out, _, summary = ran(*words, "--add offset --out found --no-rerun --write out.xml")
     assert out.startswith("Result: good (explicit model)")
     assert "off1, off2, off3, off4, off5, off6 have no place in the file and are left out" in out
     assert max(summary["validation"]["models"]["explicit"]["position_error_rms"]) < 1e-3
@@ -117,7 +117,7 @@ def test_an_offset_is_no_error_of_the_simulated_robot(ran, changed):
 
 @pytest.mark.thorough
 def test_what_is_left_out_is_zero_in_the_file(idbench, ran, logs, tmp_path):
-    ran("identify", logs / "first.parquet", "--robot puma560 --model explicit --without Fs6 --write-mjcf out.xml")
+    ran("identify", logs / "first.parquet", "--robot puma560 --model explicit --without Fs6 --write out.xml")
     made = standard_parameters(Robot.load(str(tmp_path / "out.xml")))
     assert made["Fs6"] == pytest.approx(0, abs=1e-3)
     assert made["Fs5"] == pytest.approx(0.86, rel=0.02)

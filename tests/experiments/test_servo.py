@@ -69,7 +69,7 @@ def words(bench, *more):
 
 
 def test_servo_of_a_bench_is_found_and_written(bench, idbench):
-    more = ("--friction", "coulomb", "--validate", bench / "new.csv", "--write-mjcf", "out.xml", "--out", "results")
+    more = ("--friction", "coulomb", "--validate", bench / "new.csv", "--write", "out.xml", "--out", "results")
     code, out, err = idbench(*words(bench, *more))
     assert code == 0, err
     assert "torque is never off" in out
@@ -220,7 +220,7 @@ def test_wrong_servo_files_are_refused(bench, tmp_path, complaint, text, expecte
         (["--units", "q=deg"], "is the command in degrees"),
         (["--columns", "command=goal"], "--columns command=NAME"),
         (["--columns", "torque=goal"], "give t="),
-        (["--write-mjcf", "out.txt"], "must end with .xml"),
+        (["--write", "out.txt"], "must end with .xml"),
     ],
 )
 def test_wrong_options_are_refused(bench, complaint, more, expected):
@@ -289,7 +289,7 @@ def test_backlash_of_a_simulated_servo_is_found(idbench, tmp_path, degrees, seed
     assert main(["run", str(tmp_path / "servo.toml"), "--out", str(tmp_path / "run"), "--no-rerun"]) == 0
     log, stated = tmp_path / "run" / "log.parquet", tmp_path / "run" / "servo.toml"
     find = ["--friction", "coulomb", "--find", "backlash"]
-    files = ["--write-mjcf", str(tmp_path / "play.xml"), "--out", str(tmp_path / "found")]
+    files = ["--write", str(tmp_path / "play.xml"), "--out", str(tmp_path / "found")]
     assert main(["servo", str(log), "--robot", "pendulum", "--servo", str(stated), *find, *files]) == 0
     joint = json.loads((tmp_path / "found" / "summary.json").read_text())["joints"]["swing"]
     assert joint["backlash"]["value"] == pytest.approx(play, rel=0.1)
@@ -316,7 +316,7 @@ def test_logs_may_be_of_other_loads(bench, idbench, tmp_path):
     (tmp_path / "servo.toml").write_text(f'{plain}[logs."heavy*"]\nrobot = "heavy.xml"\n')
     logs = ["servo", bench / "fit.csv", tmp_path / "heavy-5.csv", "--robot", bench / "pendulum.xml", "--friction", "coulomb"]
     more = ["--servo", tmp_path / "servo.toml", "--validate", tmp_path / "heavy-5.csv", bench / "new.csv", "--json"]
-    code, out, err = idbench(*logs, *more, "--write-mjcf", "out.xml", "--out", "named")
+    code, out, err = idbench(*logs, *more, "--write", "out.xml", "--out", "named")
     assert code == 0, err
     found = json.loads(out)
     p = {name: entry["value"] for name, entry in found["joints"]["axis"].items()}

@@ -58,7 +58,7 @@ def leg(request, tmp_path, monkeypatch):
 @pytest.mark.thorough
 @pytest.mark.parametrize("leg", ["Euler", "implicitfast"], indirect=True)
 def test_the_file_of_a_simulation_is_found_from_commands_and_positions(leg):
-    found = identified("--simulated", "--find", "a", "--out", "out", "--write-mjcf", "found.xml")
+    found = identified("--simulated", "--find", "a", "--out", "out", "--write", "found.xml")
     for joint, kp in (("hip", 40.0), ("knee", 30.0)):
         of = found["joints"][joint]
         assert of["kp"]["value"] == pytest.approx(kp, rel=0.01)

@@ -31,8 +31,8 @@ def test_the_rate_limit_is_the_speed_of_the_datasheet():
 
 
 def test_files_of_a_device_are_read(idbench, tmp_path):
-    code, out, err = idbench("device", "STS3215", "--write-mjcf", tmp_path / "arm.xml", "--robot", "servo_arm",
-                             "--joints", "elbow", "shoulder", "--kp", "32", "--write", tmp_path / "servo.toml")  # fmt: skip
+    code, out, err = idbench("device", "STS3215", "--write", tmp_path / "arm.xml", tmp_path / "servo.toml",
+                             "--robot", "servo_arm", "--joints", "elbow", "shoulder", "--kp", "32")  # fmt: skip
     assert code == 0, err
     assert "one unit was logged" in out
     model = mujoco.MjModel.from_xml_path(str(tmp_path / "arm.xml"))

@@ -101,8 +101,8 @@ def test_torques_are_explained_and_sigma_holds_the_truth(real):
 
 
 WAYS = {
-    "default": ["--write", "b.json", "--write-mjcf", "d.xml"],
-    "rotors": ["--armature", "all", "--model", "explicit", "--write-mjcf", "d.xml"],
+    "default": ["--write", "b.json", "d.xml"],
+    "rotors": ["--armature", "all", "--model", "explicit", "--write", "d.xml"],
     "stribeck": ["--friction", "standard+stribeck", "--model", "explicit", "--write", "b.json"],
     "auto": ["--friction", "auto", "--model", "explicit", "--write", "b.json"],
 }

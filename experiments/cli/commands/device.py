@@ -3,7 +3,7 @@
 from rich.text import Text
 
 from idbench.experiments.cli.options.tools import ShowDevice
-from idbench.experiments.cli.saving import require_target
+from idbench.experiments.cli.saving import require_targets
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.robot_model import absolute
 from idbench.experiments.results.page import Page
@@ -19,13 +19,11 @@ def device(options: ShowDevice) -> None:
     if not 0 < options.kp < float("inf"):
         raise ExperimentError(f"--kp {options.kp:g} must be a finite number above 0")
     robot = absolute(options.robot or BENCH)
-    names = Robot.load(robot).joints if options.robot or options.joints or options.write_mjcf else ()
+    names = Robot.load(robot).joints if options.robot or options.joints or options.write else ()
     if wrong := [joint for joint in options.joints if joint not in names]:
         raise ExperimentError(f"--joints {wrong[0]}: {robot} has no such joint; it has {', '.join(names)}")
     page = Page(machine=options.json)
-    for option, path, ending in (("--write-mjcf", options.write_mjcf, ".xml"), ("--write", options.write, ".toml")):
-        if path is not None:
-            require_target(option, path, ending, force=options.force)
+    require_targets(options.write, [".xml", ".toml"], force=options.force)
     if not options.name:
         page.found |= {"devices": list(devices())}
         for name, known in devices().items():
@@ -34,15 +32,15 @@ def device(options: ShowDevice) -> None:
         return
     page.found |= device_of(options.name)
     _print(page, options.name)
-    if options.write_mjcf is not None:
-        places = [names.index(joint) for joint in options.joints or names]
-        text = mjcf_of_device(device_of(options.name), robot, places, options.kp, options.write_mjcf.absolute().parent)
-        write_text(options.write_mjcf, text, "--write-mjcf", force=options.force)
-        page.print(f"written to {options.write_mjcf}: {options.name} at {', '.join(names[j] for j in places)}", soft_wrap=True)
-        page.warn({"the written file": cannot_express(device_of(options.name)["parameters"])})
-    if options.write is not None:
-        write_text(options.write, servo_toml_of(device_of(options.name)), "--write", force=options.force)
-        page.print(f"written to {options.write}: what is known of it, for idbench servo --servo", soft_wrap=True)
+    known, places = device_of(options.name), [names.index(joint) for joint in options.joints or names]
+    for path in options.write:
+        text, said = servo_toml_of(known), "what is known of it, for idbench servo --servo"
+        if path.suffix == ".xml":
+            text = mjcf_of_device(known, robot, places, options.kp, path.absolute().parent)
+            said = f"{options.name} at {', '.join(names[j] for j in places)}"
+            page.warn({"the written file": cannot_express(known["parameters"])})
+        write_text(path, text, "--write", force=options.force)
+        page.print(f"written to {path}: {said}", soft_wrap=True)
     page.close()
 
 

@@ -92,24 +92,24 @@ def view_all(shown: Shown, attempts: Attempts) -> None:
     attempts.attempt("report.html", lambda: report(shown, attempts))
     attempts.attempt("the recording", lambda: recording(shown))
     told = set[str]()
-    for option, path in _targets(shown.options):
-        attempts.attempt(f"{option} {path}", lambda option=option, path=path: _export(shown, option, path, told))  # type: ignore[misc]
+    for path in shown.options.write:
+        attempts.attempt(f"--write {path}", lambda path=path: _export(shown, path, told))  # type: ignore[misc]
     out = shown.folder.out if shown.folder else None
     shown.page.print(f"written to {out}{shown.options.watching.hint(out)}" if out else NOT_SAVED, soft_wrap=True)
     shown.page.show()
 
 
-def _export(shown: Shown, option: str, path: Path, told: set[str]) -> None:
+def _export(shown: Shown, path: Path, told: set[str]) -> None:
     """Write a file for other software, with the parameters of the first model that has an estimate."""
     export, leading = EXPORTS[path.suffix], shown.judgement.fit.leading
     made = export.render(shown.judgement.fit, leading, path)
     if path not in made.texts:  # a folder of files
-        folder_for(path, option)
+        folder_for(path, "--write")
     for target, text in made.texts.items():
-        if shown.folder and shown.folder.goes_beside(target, option):
+        if shown.folder and shown.folder.goes_beside(target, "--write"):
             shown.folder.add(target.name, text)
         else:
-            write_text(target, text, option, force=shown.options.force, read=shown.folder.read if shown.folder else ())
+            write_text(target, text, "--write", force=shown.options.force, read=shown.folder.read if shown.folder else ())
     named = ", ".join(map(str, made.texts if path in made.texts else [path]))
     shown.page.print(Text(f"written to {named}: {export.what} with the parameters of the {leading} model"), soft_wrap=True)
     for note in (note for note in made.notes if note not in told):
@@ -118,22 +118,14 @@ def _export(shown: Shown, option: str, path: Path, told: set[str]) -> None:
     shown.page.warn({"the file that was written": made.warnings})
 
 
-def _targets(options: Identify) -> list[tuple[str, Path]]:
-    """Return the files for other software, and the options that name them."""
-    own = [("--write-mjcf", options.write_mjcf)] if options.write_mjcf else []
-    return [*own, *(("--write", path) for path in options.write)]
-
-
 def require_targets(options: Identify, robot_model: RobotModel, folder: ResultsFolder | None, read: Sequence[Path]) -> None:
     """Raise ExperimentError if what is asked for cannot be written there; before the work, not after it."""
-    for option, path in _targets(options):
-        if option == "--write-mjcf" and path.suffix != ".xml":
-            raise ExperimentError(f"--write-mjcf {path}: its name must end with .xml, or nothing would read it back")
+    for path in options.write:
         if path.suffix not in EXPORTS:
             raise ExperimentError(f"--write {path}: its name must end with {', '.join(EXPORTS)}")
-        if not (folder and folder.goes_beside(path, option)):
-            EXPORTS[path.suffix].require_free(path, option, force=options.force, read=read)
+        if not (folder and folder.goes_beside(path, "--write")):
+            EXPORTS[path.suffix].require_free(path, "--write", force=options.force, read=read)
         EXPORTS[path.suffix].require(robot_model, path)
-    targets = [path.absolute() for _, asked in _targets(options) for path in EXPORTS[asked.suffix].paths(asked)]
+    targets = [path.absolute() for asked in options.write for path in EXPORTS[asked.suffix].paths(asked)]
     if twice := next((path for k, path in enumerate(targets) if path in targets[:k]), None):
         raise ResultsError(f"{twice} is to be written twice: give each file a name of its own")

@@ -10,7 +10,7 @@ from rich.text import Text
 
 from idbench.experiments.cli.command import command_of, with_own_parts
 from idbench.experiments.cli.options.jobs import IdentifyGains, IdentifyPayload
-from idbench.experiments.cli.saving import folder_of, require_target, save_summary
+from idbench.experiments.cli.saving import folder_of, require_targets, save_summary
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.inputs import files_of
 from idbench.experiments.loads.job import LoadFit, gains_of, payload_of, simulated_pairs
@@ -27,8 +27,7 @@ from idbench.sim.robot.rewrite import with_body
 
 def payload(options: IdentifyPayload) -> None:
     """Identify what the gripper holds."""
-    if (path := options.write_mjcf) is not None:
-        require_target("--write-mjcf", path, ".xml", force=options.force, read=files_of(options))
+    require_targets(options.write, [".xml"], force=options.force, read=files_of(options))
     with _page(options) as (page, folder):
         if options.simulate is not None:
             _compare_ways(page, options)
@@ -36,8 +35,8 @@ def payload(options: IdentifyPayload) -> None:
             return
         made = payload_of(with_own_parts(options))
         with _identified(page, folder, options, made) as attempts:
-            if path is not None:
-                attempts.attempt("--write-mjcf", lambda: _write_mjcf(page, options, path, made))
+            for path in options.write:
+                attempts.attempt("--write", lambda path=path: _write(page, options, path, made))  # type: ignore[misc]
 
 
 def gains(options: IdentifyGains) -> None:
@@ -92,16 +91,16 @@ def _identified(
         yield attempts
 
 
-def _write_mjcf(page: Page, options: IdentifyPayload, path: Path, made: LoadFit) -> None:
+def _write(page: Page, options: IdentifyPayload, path: Path, made: LoadFit) -> None:
     """Write the robot's file with the payload as a body."""
     found, robot_model = made.leading, made.judgement.request.robot_model
     assert found is not None
     body = body_of(found)
     if "mass" not in body or negative_mass(found):
-        raise ExperimentError(f"--write-mjcf {path}: {body.get('why', 'the mass of the payload is below zero')}")
+        raise ExperimentError(f"--write {path}: {body.get('why', 'the mass of the payload is below zero')}")
     values = np.array(list(body["parameters"].values()))
     text = with_body(robot_model.name, "payload", values, path.absolute().parent, robot_model.mounting)
-    write_text(path, text, "--write-mjcf", force=options.force, read=files_of(options))
+    write_text(path, text, "--write", force=options.force, read=files_of(options))
     page.print(Text(f"written to {path}: the robot with the payload as a body of its last link"), soft_wrap=True)
 
 

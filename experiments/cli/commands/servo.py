@@ -9,7 +9,7 @@ from rich.text import Text
 
 from idbench.experiments.cli.command import command_of
 from idbench.experiments.cli.options.jobs import IdentifyServo
-from idbench.experiments.cli.saving import folder_of, require_target, save_summary
+from idbench.experiments.cli.saving import folder_of, require_targets, save_summary
 from idbench.experiments.identification.robot_model import absolute
 from idbench.experiments.inputs import files_of
 from idbench.experiments.recording.audience import Audience
@@ -30,9 +30,7 @@ if TYPE_CHECKING:
 def servo(options: IdentifyServo) -> None:
     """Identify servos."""
     page, folder = Page(machine=options.json), folder_of(options, options.out) if options.out else None
-    for option, path, ending in (("--write-mjcf", options.write_mjcf, ".xml"), ("--write", options.write, ".py")):
-        if path is not None:
-            require_target(option, path, ending, force=options.force, read=files_of(options))
+    require_targets(options.write, WRITERS, force=options.force, read=files_of(options))
     with options.watching.audience() as audience, closing(page), folder.held() if folder else nullcontext():
         page.found |= {"experiment": "servo", "robot": absolute(str(options.robot)), "friction": options.friction, "joints": {}}
         made = _identified(page, folder, options)
@@ -45,12 +43,10 @@ def servo(options: IdentifyServo) -> None:
         page.show()
         save_summary(page, folder)
         with Attempts("the results are printed" + (f", and in {folder.out}" if folder else ""), folder) as attempts:
-            if (robot_file := options.write_mjcf) is not None:
-                attempts.attempt("--write-mjcf", lambda: _write(page, options, robot_file, made))
-                attempts.attempt("summary.json", lambda: save_summary(page, folder))
             attempts.file("report.html", lambda: made.document().page(command_of(options, out=True)))
-            if (python_file := options.write) is not None:
-                attempts.attempt("--write", lambda: _write_function(page, options, python_file, made))
+            for path in options.write:
+                attempts.attempt("--write", lambda path=path: WRITERS[path.suffix](page, options, path, made))  # type: ignore[misc]
+            attempts.attempt("summary.json", lambda: save_summary(page, folder))
             if options.watching.rerun and (folder is not None or audience is not None):
                 attempts.recording(lambda: _recorded(made, audience))
         where = f"written to {folder.out}{options.watching.hint(folder.out)}" if folder else NOT_SAVED
@@ -85,7 +81,7 @@ def _write(page: Page, options: IdentifyServo, path: Path, fit: ServosFit) -> No
     """Write the robot's MJCF with the servos, and measure it in plain MuJoCo."""
     servos, found, place = fit.servos, for_mujoco(fit.fits), path.absolute().parent
     text = mjcf_of(servos, found, place, options.position)
-    write_text(path, text, "--write-mjcf", force=options.force, read=files_of(options))
+    write_text(path, text, "--write", force=options.force, read=files_of(options))
     page.print(Text(f"written to {path}: the robot with its servos, to be commanded with angles of the file"), soft_wrap=True)
     friction = ", ".join(f"{joint} Fs {own.p['Fs']:.3g} Fv {own.p['Fv']:.3g}" for joint, own in found.items() if "Fs" in own.p)
     if any(fit.fits[joint] is not own for joint, own in found.items()):
@@ -106,6 +102,10 @@ def _write_function(page: Page, options: IdentifyServo, path: Path, fit: ServosF
     text = servo_function(Path(servos.robot).name, known, [log.name for log in servos.logs])
     write_text(path, text, "--write", force=options.force, read=files_of(options))
     page.print(Text(f"written to {path}: the servos as a Python file"), soft_wrap=True)
+
+
+WRITERS = {".xml": _write, ".py": _write_function}
+"""What writes servos, by the ending of the name."""
 
 
 def _recorded(fit: ServosFit, audience: Audience | None) -> "Streams":

@@ -58,9 +58,6 @@ class Identify(jobs.IdentifyRequest, RecordedOptions, Command, called="identify"
     follow: Annotated[float | None, Word("SECONDS")] = None
     """Identify a CSV log while it is being written, until it has not grown for this time, then as a whole. --live or --serve
     show estimates and residuals as they develop."""
-    write_mjcf: File = None
-    """Write the robot's MJCF file with the identified inertias, armatures and frictions of the first model, made physically
-    consistent."""
     write: Files = ()
     """Files to write. The identified robot: .xml, .urdf or .sdf; its joints' actuators: .yaml. For a controller, dynamics and
     regressors as functions: .c, .py. Base parameters with their covariance: .json. For training, ranges with code: .toml; a
@@ -109,8 +106,8 @@ class Excite(jobs.ExciteRequest, RecordedOptions, Command, called="excite", acti
 class IdentifyPayload(jobs.PayloadRequest, WrittenOptions, Command, called="payload", action="loads:payload"):
     """Identify what the gripper holds: mass, first moments, inertia, from logs with it and logs without it."""
 
-    write_mjcf: File = None
-    """Write the robot's file with the payload as a physically consistent body."""
+    write: Files = ()
+    """Write the robot's file with the payload as a physically consistent body: .xml."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -125,12 +122,11 @@ class IdentifyGains(jobs.GainsRequest, WrittenOptions, Command, called="gains", 
 class IdentifyServo(jobs.ServoRequest, RecordedOptions, Command, called="servo", action="servo:servo"):
     """Identify joints under position loops (servos, legs, MuJoCo's actuators) from commands and positions; write them."""
 
-    write_mjcf: File = None
-    """Write the robot's MJCF file with these servos as `dcmotor` actuators, and measure it on a log in plain MuJoCo."""
-    write: File = None
-    """Write the servos as a Python file (class `Servo`), for your own simulator."""
+    write: Files = ()
+    """Files to write: .xml, the robot's MJCF with these servos as actuators, measured on a log in plain MuJoCo; .py, the servos
+    as a Python file (class `Servo`), for your own simulator."""
     position: bool = False
-    """Write `position` actuators instead, for older versions of MuJoCo."""
+    """Write `position` actuators instead of `dcmotor`, for older versions of MuJoCo."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -86,10 +86,8 @@ class ShowDevice(Command, called="device", action="device:device"):
     """Joints that it drives. Default: all."""
     kp: float = 16.0
     """Gain of the firmware."""
-    write_mjcf: words.File = None
-    """Write the robot's MJCF with the device as `dcmotor` actuators."""
-    write: words.File = None
-    """Write a servo.toml of what is known of it."""
+    write: words.Files = ()
+    """Files to write: .xml, the robot with the device as `dcmotor` actuators; .toml, a servo.toml of what is known of it."""
     force: bool = False
     """Replace existing files."""
     json: words.Json = False
