@@ -46,6 +46,8 @@ class Document:
     """What was found."""
     notes: Sequence[str]
     """What else belongs to it: what was read and assumed."""
+    step: str = ""
+    """What to do next."""
     figures: Callable[[], Sequence[tuple[str, str]]] = tuple
     """Makes titles and SVG of its pictures."""
 

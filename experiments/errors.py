@@ -14,6 +14,10 @@ class ResultsError(ExperimentError):
     """A results folder that cannot be written or read."""
 
 
+class RequirementError(ExperimentError):
+    """A complete result that falls short of what was required of it."""
+
+
 class StudyError(ExperimentError):
     """A study that cannot be run: a file, an axis, a folder, a cluster."""
 

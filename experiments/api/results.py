@@ -11,7 +11,7 @@ import numpy as np
 
 from idbench.experiments.api.logs import given_log
 from idbench.experiments.errors import ExperimentError
-from idbench.experiments.exports.exports import EXPORTS
+from idbench.experiments.exports.exports import kind_of
 from idbench.experiments.identification.fit import Fit
 from idbench.experiments.identification.job import summary_of
 from idbench.experiments.identification.load import within
@@ -213,7 +213,8 @@ class Identification:
         """Write files for other software, and return what is to be said of them.
 
         .xml, .urdf, .sdf: the identified robot; .yaml, its actuators; .json, base parameters; .py, .c, functions for a
-        controller; .toml, ranges for training; .ensemble, a folder of robots.
+        controller; .toml, robots for training with code; .ensemble, the same in a folder; sysid.py, parameters for
+        mujoco.sysid; cogmap.csv, the joints' cogging.
 
         Raises
         ------
@@ -228,13 +229,11 @@ class Identification:
         """
         read = (Robot.path(self.robot.name),)  # never written over
         for path in (path_of(path, "write") for path in paths):
-            if path.suffix not in EXPORTS:
-                raise ExperimentError(f"{path}: its name must end with {', '.join(EXPORTS)}")
-            EXPORTS[path.suffix].require_free(path, "write", force=force, read=read)
-            EXPORTS[path.suffix].require(self.robot, path)
+            kind_of(path, "write").require_free(path, "write", force=force, read=read)
+            kind_of(path, "write").require(self.robot, path)
         notes = list[str]()
         for path in map(Path, paths):
-            made = EXPORTS[path.suffix].render(self.fit, self.model, path)
+            made = kind_of(path, "write").render(self.fit, self.model, path)
             if path not in made.texts:  # a folder of files
                 folder_for(path, "write")
             for target, text in made.texts.items():

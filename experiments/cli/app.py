@@ -8,7 +8,7 @@ from importlib.metadata import version
 
 from idbench.experiments.cli.command import COMMANDS
 from idbench.experiments.cli.interruption import INTERRUPTED, Notice, TerminatedError, importing, noticing, terminating
-from idbench.experiments.errors import ExperimentError, is_told, reason, report, visible
+from idbench.experiments.errors import ExperimentError, RequirementError, is_told, reason, report, visible
 
 DESCRIPTION = "A MuJoCo testbench for the dynamic identification of robots."
 
@@ -61,7 +61,7 @@ def run(args: Sequence[str] | None = None) -> int:
         return _complain("interrupted", INTERRUPTED)
     except Exception as error:
         if is_told(error):
-            return _complain(reason(error), 2)
+            return _complain(reason(error), 1 if isinstance(error, RequirementError) else 2)
         if notice.pressed:
             return _complain("interrupted", INTERRUPTED)
         return _complain(f"{reason(error)}; its traceback is in {report(error)}", 1)

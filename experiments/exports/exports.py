@@ -10,18 +10,18 @@ from pathlib import Path
 
 import numpy as np
 
+from idbench.experiments.errors import ExperimentError
 from idbench.experiments.exports.c_code import c_texts
 from idbench.experiments.exports.code import Content
 from idbench.experiments.exports.functions import require_formulas
+from idbench.experiments.exports.joint_files import actuators_text, cogging_map, require_cogging, sysid_text
 from idbench.experiments.exports.python_code import python_text
 from idbench.experiments.identification.consistent_robot import WrittenRobot
 from idbench.experiments.identification.fit import Fit
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.results.writing import finite, require_free, require_free_folder
-from idbench.identify.basis.block import named
 from idbench.identify.data.kinematics import INERTIAL
 from idbench.sim.robot.rewrite import rewritten
-from idbench.sim.robot.tree import standard_parameters
 
 EARTH = [0.0, 0.0, -9.81]  # Gravity as readers of these files have it
 SMALLEST = 0.1  # Share of a joint's torque [%] from which on something that is missing is named
@@ -108,30 +108,8 @@ def _turned(written: WrittenRobot) -> list[str]:
 
 def actuators(fit: Fit, model: str, path: Path) -> Exported:
     """What a training framework asks of each joint's actuator, as YAML, with standard errors."""
-    written, robot = WrittenRobot(fit, model), fit.robot_model.robot
-    most, known = robot.most("velocity"), standard_parameters(robot)
-    lines = [
-        f"# {fit.robot_model.tree.name}: {', '.join(fit.logs.names)}, {model} model, idbench {version('idbench')}.",
-        "# armature [kg m^2], frictionloss [N m], damping [N m s/rad]; of slides kg, N, N s/m. null: not known.",
-        "# from: log; sum: a share of what the log shows, as near to the robot's file as that allows; stated; file.",
-        "joints:",
-    ]
-    for j, joint in enumerate(robot.joints):
-        lines.append(f"  {json.dumps(joint)}:")
-        for key, letters in (("armature", "Ia"), ("frictionloss", "Fs"), ("damping", "Fv")):
-            name = named(letters, j)
-            value, sigma = written.values.get(name, known.get(name, 0.0)), written.sigma.get(name)
-            found = {key: _or_null(value), f"{key}_sigma": _or_null(sigma), f"{key}_from": written.source(name)}
-            lines += [f"    {what}: {x}" for what, x in found.items()]
-        lines += [f"    effort_limit: {_or_null(robot.torque_limits[j])}", f"    velocity_limit: {_or_null(most[j])}"]
-    return Exported({path: "\n".join(lines) + "\n"}, written.warnings)
-
-
-def _or_null(x: float | None) -> str:
-    if x is None or not np.isfinite(x):
-        return "null"
-    text = repr(float(x))
-    return text.replace("e", ".0e") if "e" in text and "." not in text else text  # or a reader of YAML 1.1 takes it for text
+    written = WrittenRobot(fit, model)
+    return Exported({path: actuators_text(written)}, written.warnings)
 
 
 FOLDER = ".ensemble"  # Ending of the name of a folder with robots
@@ -254,6 +232,12 @@ def drawn(fit: Fit, model: str, path: Path) -> Exported:
     return Exported(texts, WrittenRobot(fit, model).warnings, notes(robots))
 
 
+def sysid_parameters(fit: Fit, model: str, path: Path) -> Exported:
+    """Return parameters for mujoco.sysid, which begins at the estimate and searches within its 95 % intervals."""
+    written = WrittenRobot(fit, model)
+    return Exported({path: sysid_text(written, f"{fit.robot_model.tree.name}, {origin(fit, model)}")}, written.warnings)
+
+
 def _content(fit: Fit, model: str, path: Path) -> Content:
     estimate = fit.estimates[model]
     functions = require_formulas(estimate.problem.basis, fit.robot_model.tree, path)
@@ -280,9 +264,19 @@ EXPORTS: dict[str, FileKind] = {
     ".sdf": FileKind("the robot", sdf, require_written_back),
     ".yaml": FileKind("values of the joints' actuators", actuators, require_written_back),
     ".json": FileKind("base parameters and regressor", base_parameters, lambda *_: None),
+    "sysid.py": FileKind("parameters for mujoco.sysid", sysid_parameters, require_written_back),
+    "cogmap.csv": FileKind("the joints' cogging", lambda *of: Exported({of[2]: cogging_map(*of)}), require_cogging),
     ".py": FileKind("dynamics and regressors in Python", python_module, require_functions),
     ".c": FileKind("dynamics and regressors in C, with their header,", c_source, require_functions, (".h",)),
     ".toml": FileKind("robots drawn from what is not known, with code for training,", drawn, require_written_back, CODE),
     FOLDER: FileKind("robots drawn from what is not known", drawn, require_written_back),
 }
 """What is written, by the ending of its name."""
+
+
+def kind_of(path: Path, option: str) -> FileKind:
+    """Kind of file that a name asks for, by the longest ending; ExperimentError if there is none."""
+    endings = [ending for ending in EXPORTS if path.name.endswith(ending) and path.suffix]
+    if not endings:
+        raise ExperimentError(f"{option} {path}: its name must end with {', '.join(EXPORTS)}")
+    return EXPORTS[max(endings, key=len)]

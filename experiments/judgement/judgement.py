@@ -68,6 +68,17 @@ class Judgement:
         """Whether the leading model is good on every held-out log."""
         return self.hardest is not None and WORDS[_place(self.hardest)] == "good"
 
+    def short_of(self, percent: float) -> str:
+        """What falls short of torque errors of this share on every held-out log; empty if nothing does."""
+        if not self.held_out:
+            return "it was judged on no held-out log"
+        worst, gains = max(_worst(one) for one in self.held_out), self.fit.hidden_gains
+        if worst > percent:
+            return f"torque errors of {error_percentage(worst)} on a held-out log"
+        if gains is None or not np.max(gains) <= WEAK:
+            return "the log would not show a torque constant that is 10 % off"
+        return ""
+
     def summary(self) -> dict[str, Any]:
         """Its part of summary.json, beside the fit's own."""
         each = [one.summary() for one in self.on]
@@ -77,6 +88,11 @@ class Judgement:
 def _place(one: HeldOut) -> int:
     """Return the place, in WORDS, of the verdict on the leading model, which is shown and written."""
     return WORDS.index(one.verdicts[one.fit.leading].word)
+
+
+def _worst(one: HeldOut) -> float:
+    """Largest torque error of a joint, by the leading model [%]."""
+    return float(np.nanmax(np.nan_to_num(one.torques[one.fit.leading].percent, nan=0.0, posinf=np.inf)))
 
 
 def judge(result: Fit) -> Judgement:
@@ -140,7 +156,7 @@ def _finding(judgement: Judgement, causes: Sequence[Cause]) -> str:
     model = one.fit.leading
     if verdict.wrong:
         return f"Result: {verdict.word} ({model} model): {verdict.wrong[0].finding}"
-    worst = float(np.nanmax(np.nan_to_num(one.torques[model].percent, nan=0.0, posinf=np.inf)))
+    worst = _worst(one)
     beyond = float(np.nanmax(np.nan_to_num(one.torques[model].percent_of_level(one.torques[model].excess), posinf=np.inf)))
     most = {"good": GOOD, "fair": FAIR}.get(verdict.word, np.inf)
     noisy = f", {error_percentage(beyond)} beyond noise and sigma," if beyond < most < worst else ""

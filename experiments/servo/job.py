@@ -16,7 +16,7 @@ from idbench.experiments.identification.robot_model import absolute
 from idbench.experiments.requests.jobs import ServoRequest
 from idbench.experiments.servo.identification import AUTO, Servos, summary_of
 from idbench.experiments.servo.joints import Identified
-from idbench.experiments.servo.servo_text import remedy_of, servo_table, verdict_lines, warnings_of
+from idbench.experiments.servo.servo_text import choice_table, remedy_of, servo_table, verdict_lines, warnings_of
 from idbench.identify import Array, IdentificationError, SettingError
 from idbench.identify.files.servo_file import ServoFile
 from idbench.identify.files.servo_log import USUAL, ServoColumns, ordered, read_servo_log
@@ -66,6 +66,14 @@ class ServosFit:
         return verdict_lines(self.fits, self.errors["fitted"], self.errors.get("held out", {}), moved, self.mistakes)
 
     @property
+    def step(self) -> str:
+        """What to do next: mend what was proved, or look at the first doubt; a good result is kept."""
+        remedies = [remedy_of(mistake) for mistake in self.mistakes.values()]
+        doubts = [line for lines in self.warnings.values() for line in lines]
+        kept = ["--write robot.xml servo.py keeps the servos"] if self.verdicts[0][0] == "good" else doubts
+        return [*remedies, *kept, "log another motion, and name it with --validate"][0]
+
+    @property
     def lines(self) -> list[str]:
         """Why joints have no fit, and what was read and assumed."""
         return [
@@ -82,8 +90,9 @@ class ServosFit:
     def document(self) -> Document:
         """What the fits say: verdicts, parameters, positions of the last log and their errors."""
         loops = ", ".join(dict.fromkeys(f"driven by {fit.servo.kind}" for fit in self.fits.values()))
-        title, table = f"{self.servos.robot}: {', '.join(self.fits)}", servo_table(self.fits)
-        return Document(title, loops, self.verdicts, self.warnings, [table], self.lines, self._figures)
+        title, of_laws = f"{self.servos.robot}: {', '.join(self.fits)}", (choice_table(*of) for of in self.choices.items())
+        tables = [servo_table(self.fits, self.errors), *of_laws]
+        return Document(title, loops, self.verdicts, self.warnings, tables, self.lines, self.step, self._figures)
 
     def _figures(self) -> list[tuple[str, str]]:
         """Titles and pictures of the positions of the last log, and of their errors."""
@@ -121,7 +130,7 @@ class ServosFit:
     def summary(self) -> dict[str, Any]:
         """Summary of the fits and of their errors."""
         each = {what: {joint: [float(x) for x in e] for joint, e in of.items()} for what, of in self.errors.items()}
-        return self.parameters() | {"position_error": each, "verdict": [line for _, line in self.verdicts]}
+        return self.parameters() | {"position_error": each, "verdict": [line for _, line in self.verdicts], "next": self.step}
 
 
 Heard = Callable[[str, Identified | str, ServosFit], None]

@@ -119,6 +119,7 @@ push each other, a simulated leg was off by 7.6, 0.7, 0.5 and 0.1 mrad after one
 
 PASSES = 2  # Times that joints are fitted to loads that follow from the fits of the others
 WORSE = 0.01  # Share by which the error of a joint may rise when offsets are made to agree: as much as searches end apart
+LATE = 0.1  # The same for one delay of all joints: of a leg whose joints have one and friction by the load it is .04
 UNLOADED = JointLoad(*(np.zeros(()) for _ in range(4)))  # stands in while columns are checked
 
 
@@ -206,6 +207,9 @@ class Joints:
                 yield j, again
         with stage("offsets of all joints"):
             agreed = self._agreed(before, known)
+        with stage("one delay of all joints"):  # that of a message, unless the log says otherwise
+            late = tied(agreed, ("delay",))
+            agreed = late if self._as_well(late, agreed, LATE) else agreed
             yield from agreed.items()
         for motor in motors:
             with stage(f"one motor of {', '.join(self.links.joints[j] for j in motor)}"):
@@ -214,15 +218,16 @@ class Joints:
     def _agreed(self, before: Mapping[int, ServoFit], fits: Mapping[int, ServoFit]) -> dict[int, ServoFit]:
         """Fits whose offsets agree, or as they are where a joint is simulated less well with these."""
         moved = self._together(before, fits)
-        errors = [self._errors(some) for some in (fits, moved)]
-        if all(errors[1][j] <= (1 + WORSE) * errors[0][j] for j in fits):
+        if self._as_well(moved, fits):
             return moved
         return {j: replace(fit, of_all=moved[j].of_all) for j, fit in fits.items()}
 
-    def _errors(self, fits: Mapping[int, ServoFit]) -> dict[int, float]:
-        """Mean error of each joint [rad]."""
-        runs = self.runs_with(fits)
-        return {j: float(np.mean(fit.errors(runs[j]))) for j, fit in fits.items()}
+    def _as_well(self, moved: Mapping[int, ServoFit], fits: Mapping[int, ServoFit], worse: float = WORSE) -> bool:
+        """True if no joint's mean error is larger than with other fits, by more than a share."""
+        runs = [self.runs_with(some) for some in (moved, fits)]
+        return all(
+            np.mean(moved[j].errors(runs[0][j])) <= (1 + worse) * np.mean(fit.errors(runs[1][j])) for j, fit in fits.items()
+        )
 
     def _together(self, before: Mapping[int, ServoFit], fits: Mapping[int, ServoFit]) -> dict[int, ServoFit]:
         """Fits whose offsets agree, of some whose loads assume the offsets of the fits before."""

@@ -40,16 +40,17 @@ EXPRESSIBLE = ("a", "b", "Ia", "Fs", "Fv", "offset", "lag", "lead", "delay", "ra
 """Parameters that a file of MuJoCo has, or that its user adds to commands."""
 
 
-def cannot_express(letters: Iterable[str]) -> list[str]:
-    """Parameters that a file of MuJoCo has no place for."""
-    lost = dict.fromkeys(x for x in letters if x not in EXPRESSIBLE)
+def cannot_express(letters: Iterable[str], motor: bool = True) -> list[str]:
+    """Parameters that a file of MuJoCo has no place for; that of a DC motor has none for a constant torque."""
+    lost = dict.fromkeys(x for x in letters if x not in EXPRESSIBLE and (motor or x != "bias"))
     meanings = ", ".join(f"{x} ({SERVO_PARAMETERS[x].meaning})" for x in lost)
     return [f"MuJoCo's dcmotor cannot express {meanings}: what is simulated with the file lacks that"] if lost else []
 
 
 def inexpressible(fits: Mapping[str, ServoFit]) -> list[str]:
     """Identified effects that MuJoCo's servos lack."""
-    found = cannot_express(x for fit in fits.values() for x in fit.free)
+    motor = any(fit.servo.kind == Servo.kind for fit in fits.values())
+    found = cannot_express((x for fit in fits.values() for x in fit.p if fit.p[x]), motor)
     if any("backlash" in fit.free for fit in fits.values()):
         found.append("backlash is written as a second joint; the loop of the dcmotor sees the rotor, before the play")
     words = ", ".join(f"{joint} {fit.offset:+.4g}" for joint, fit in fits.items())
@@ -71,7 +72,7 @@ def values_of(parameters: Mapping[str, float], servo: Servo) -> ServoValues:
     slope = servo.slope * (1 + p.gain_error)
     delay = p.delay - servo.steps.early  # of a simulation, which acts early as well
     drive = p.a, p.b, slope, servo.supply, servo.limit, p.Ia, p.Fv, p.Fs, p.rate, delay, p.backlash
-    return ServoValues(*drive, servo.kd + slope * p.lead, p.lag, servo.kind == Servo.kind)
+    return ServoValues(*drive, servo.kd + slope * p.lead, p.lag, servo.kind == Servo.kind, p.bias)
 
 
 def for_mujoco(fits: Mapping[str, ServoFit]) -> dict[str, ServoFit]:

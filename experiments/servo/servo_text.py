@@ -5,7 +5,7 @@ from collections.abc import Collection, Iterator, Mapping
 import numpy as np
 
 from idbench.experiments.document import Listing
-from idbench.experiments.judgement.held_out import FAIR, GOOD
+from idbench.experiments.judgement.held_out import FAIR, GOOD, WORDS
 from idbench.experiments.servo.identification import unit_of
 from idbench.experiments.text import error_percentage, number, of_each
 from idbench.identify import Array
@@ -43,17 +43,18 @@ MISTAKEN: Mapping[str, str] = {
 LETTERS = {cause: letter for letter, cause in MISTAKES.items()}  # The parameter that each cause is
 
 
-def servo_table(fits: Mapping[str, ServoFit]) -> Listing:
-    """Table of the parameters with their standard errors."""
+def servo_table(fits: Mapping[str, ServoFit], errors: Mapping[str, Mapping[str, Array]] = {}) -> Listing:
+    """Table of the parameters with their standard errors, and mean errors of positions that follow from commands alone."""
     first = next(iter(fits.values()))
     rows = (
         (f"{name} [{unit_of(first.servo, name)}]", *(value_of(fit, name) for fit in fits.values()))
         for name in SERVO_PARAMETERS
         if any(name in fit.p for fit in fits.values())
     )
+    off = ((f"error, {what} [rad]", *(f"{np.mean(of[joint]):.2g}" for joint in fits)) for what, of in errors.items())
     laws = dict.fromkeys(LAWS[fit.servo.kind] for fit in fits.values())
     title = f"servos: torque = {', or '.join(laws)}, friction and armature at the joint"
-    return Listing(title, ("", *fits), tuple(rows))
+    return Listing(title, ("", *fits), (*rows, *off))
 
 
 def value_of(fit: ServoFit, name: str) -> str:
@@ -64,12 +65,6 @@ def value_of(fit: ServoFit, name: str) -> str:
         return "no scale" if name == "offset" else "{} x {:.2g} to {:.2g}".format(number(fit.p[name]), *fit.factor)
     sigma = fit.standard_errors.get(name)
     return f"{number(fit.p[name])} held" if sigma is None else concise(fit.p[name], sigma)
-
-
-def error_line(what: str, joint: str, errors: Array) -> str:
-    """Mean absolute error of positions that follow from commands alone, in words."""
-    mean = float(np.mean(errors))
-    return f"{what}, {joint}: mean error of the position {mean:.2g} rad ({np.rad2deg(mean):.2g} deg)"
 
 
 def warnings_of(fits: Mapping[str, ServoFit | str], mistakes: Collection[str] = ()) -> list[str]:
@@ -126,21 +121,25 @@ def verdict_lines(
     moved: Mapping[str, float],
     mistakes: Mapping[str, Suspect],
 ) -> list[tuple[str, str]]:
-    """Lines, each after its verdict: whether models hold on held-out logs ("unsure" of other lines), and what they lack.
+    """Lines, each after its verdict: on the worst joint, on each, how they do on held-out logs, and what they lack ("unsure").
 
     All by joint: mean errors of positions in the fitted and in the held-out logs [rad], shape (log,), rms of the motion of the
     held-out logs about its mean [rad], and what was proved to be wrong.
     """
-    lines, word_of = list[tuple[str, str]](), dict[str, str]()
+    lines, word_of, worst = list[tuple[str, str]](), dict[str, str](), list[tuple[int, float, str]]()
     for joint, fit in fits.items():
         word, why = _holds(fit, fitted[joint], held_out.get(joint), moved.get(joint, 0.0), joint in mistakes)
         lines.append((joint, f"{word}: {why}" if joint in held_out else why))
         word_of[lines[-1][1]] = word
+        share = float(np.mean(held_out.get(joint, 0.0))) / max(moved.get(joint, 0.0), TINY)
+        worst.append((WORDS.index(word), share, f"Result: {word} ({joint}): {why}"))
+    first = max(worst)
     words = [(joint, mistake_words(mistake)) for joint, mistake in mistakes.items()]
     alike = [(joint, text) for joint, fit in fits.items() if (text := confounded(fit))]
     lacks = [(joint, _lacks(fit)) for joint, fit in fits.items()]
     rest = [("unsure", line) for some in (words, alike, lacks) for line in of_each(some).values()]
-    return [*((word_of[why], line) for why, line in of_each(lines).items()), *rest]
+    each = [(word_of[why], line) for why, line in of_each(lines).items()] if len(lines) > 1 else []
+    return [(WORDS[first[0]], first[2]), *each, *rest]
 
 
 def mistake_words(mistake: Suspect) -> str:
@@ -167,13 +166,13 @@ def _holds(fit: ServoFit, fitted: Array, held_out: Array | None, moved: float, m
         return "unsure", "no held-out log says whether the model holds elsewhere (name a second log)"
     floor, ratio = fit.loop.step / 4, float(np.mean(held_out) / max(float(np.mean(fitted)), TINY))
     share = 100 * float(np.mean(held_out)) / max(moved, TINY)
-    off = f"its mean error there is {error_percentage(share)} of the motion"
+    off = f"positions off by {error_percentage(share)} of the motion on other logs"
     best = "fair" if mistaken or not fit.explained else "good"
     exact = bool(np.mean(held_out) <= 2 * floor)
     word = best if exact or share <= GOOD else "fair" if share <= FAIR else "poor"
     if ratio > ALIKE and share > GOOD and not exact:
-        return word, f"worse on other logs: {off}, {ratio:.2g} times that on the fitted ones"
-    return word, f"the model holds on other logs, {off}"
+        return word, f"{off}, {ratio:.2g} times as much as on the fitted ones"
+    return word, off
 
 
 def _lacks(fit: ServoFit) -> str:

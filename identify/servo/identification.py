@@ -1,6 +1,6 @@
 """The identification of a servo: rows, then the closed loop, law by law and finer from stage to stage."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -116,13 +116,14 @@ def identify_servo(
 
 
 def with_friction(fit: ServoFit, friction: str) -> ServoFit:
-    """A fit with a simpler law of friction, which begins with what friction was on average, from where it is."""
+    """A fit with a simpler law of friction, which begins with what friction was on average; all else stays as it is."""
     kept = parameters_of(friction, [name for name in fit.p if name in FURTHER])
     loads = [np.abs(run.load.torque(run.t, run.clean)).mean() for run in fit.loop.runs]
     per_load = sum(fit.p.get(name, 0.0) for name in ("Fl", "Fle", "Fgd"))
     p = {name: x for name, x in fit.p.items() if name in kept} | {"Fs": fit.p["Fs"] + per_load * float(np.mean(loads))}
-    held = {name: x for name, x in p.items() if name not in fit.free}
-    return Stages(fit.loop.runs, held, p, cut=False).fit_fine(friction, tuple(name for name in fit.free if name in p), p)
+    free = tuple(name for name in ("Fs", "Fv") if name in fit.free)
+    held = {name: x for name, x in p.items() if name not in free}
+    return Stages(fit.loop.runs, held, p, cut=False).fit_fine(friction, free, p)
 
 
 def identify_again(fit: ServoFit, runs: Sequence[ServoRun]) -> ServoFit:
@@ -140,8 +141,8 @@ def identify_again(fit: ServoFit, runs: Sequence[ServoRun]) -> ServoFit:
 OF_JOINT = ("offset", "bias", "zero", "scale_error", "Mg")  # Parameters of a joint; all others are those of its motor
 
 
-def tied(fits: Mapping[int, ServoFit]) -> dict[int, ServoFit]:
-    """Fits of joints with one value of each parameter of their motor.
+def tied(fits: Mapping[int, ServoFit], names: Collection[str] = ()) -> dict[int, ServoFit]:
+    """Fits of joints with one value of each parameter of their motor, or of some of them.
 
     With x_j the parameters of joint j, c those of its motor, H_j the curvature of its objective over the variance of its
     residuals, and M_j that of c with the others free (Schur complement), the motor's are
@@ -152,7 +153,8 @@ def tied(fits: Mapping[int, ServoFit]) -> dict[int, ServoFit]:
     parameters of each joint are then fitted again.
     """
     first = next(iter(fits.values()))
-    common = [name for name in first.free if name not in OF_JOINT and all(name in fit.free for fit in fits.values())]
+    known = [name for name in first.free if all(name in fit.free for fit in fits.values())]
+    common = [name for name in known if (name in names if names else name not in OF_JOINT)]
     if len(fits) < 2 or not common:
         return dict(fits)
     places = {j: [fit.free.index(name) for name in common] for j, fit in fits.items()}

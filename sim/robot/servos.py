@@ -65,6 +65,8 @@ class ServoValues:
     """Of a low-pass of the command [s]."""
     motor: bool = True
     """Whether a duty drives a DC motor; a torque, or a current, is what `position` and `velocity` of MuJoCo command."""
+    bias: float = 0.0
+    """Constant torque beside a loop of torque or current [N m]."""
 
 
 def links(name: str, mounting: Mounting = PLAIN, payload: Payload = Payload()) -> Robot:  # noqa: B008  # frozen
@@ -164,6 +166,11 @@ def _plain(servo: ServoValues, step: float) -> tuple[str, dict[str, str]]:
         samples = max(0, round(servo.delay / step + 0.5))  # a force acts from half a step before
         found |= {"nsample": str(samples), "delay": repr(samples * step)} if samples else {}
         found |= {"timeconst": repr(servo.time_constant)} if servo.time_constant and kp else {}
+    if servo.bias and not servo.motor:  # tau = kp u + (bias - kp q - kv qd)
+        del found["kv"]
+        biasprm = " ".join(repr(float(x)) for x in (servo.bias, -kp, -kv))
+        found |= {"dyntype": "filterexact", "dynprm": found.pop("timeconst")} if "timeconst" in found else {}
+        return "general", {"gainprm": repr(float(kp or kv)), "biastype": "affine", "biasprm": biasprm, **found}
     return ("position", {"kp": repr(float(kp)), **found}) if kp else ("velocity", found)
 
 

@@ -180,3 +180,46 @@ def test_a_transmission_of_others_is_no_rotor(tmp_path):
     (tmp_path / "arm.urdf").write_text(text.replace('gear_ratio value="1.0"', 'gear_ratio value="one"'))
     with pytest.raises(RobotError, match="gear_ratio has the value 'one'"):
         Robot.load(str(tmp_path / "arm.urdf"))
+
+
+@pytest.mark.thorough
+def test_mujoco_sysid_takes_the_parameters(found, tmp_path):
+    """It begins at the estimate, moves what the log shows alone, within 95 %, and writes it into the specification."""
+    sysid = pytest.importorskip("mujoco.sysid")
+    found.write(str(tmp_path / "arm.xml"), str(tmp_path / "sysid.py"))
+    space = {}
+    exec((tmp_path / "sysid.py").read_text(), space)
+    params = space["parameters"]()
+    free = {name for name in params.keys() if not params[name].frozen}  # noqa: SIM118
+    assert free == {f"joint{j}_{what}" for j in (1, 2) for what in ("damping", "frictionloss")}
+    low, high = params.get_bounds()
+    params.update_from_vector((np.asarray(low) + np.asarray(high)) / 2 + 0.001)
+    model = sysid.apply_param_modifiers(params, mujoco.MjSpec.from_file(str(tmp_path / "arm.xml")))
+    base = mujoco.MjModel.from_xml_path(str(tmp_path / "arm.xml"))
+    np.testing.assert_allclose(model.dof_damping, base.dof_damping + 0.001, atol=1e-6)
+    np.testing.assert_allclose(model.dof_frictionloss, base.dof_frictionloss + 0.001, atol=1e-6)
+
+
+def test_a_map_of_cogging_is_that_of_the_joint(tmp_path, rng):
+    """12 and 42 waves of known size on a motor, without a simulator: the map is their sum, within four of its sigma."""
+    t = np.arange(0, 40, 0.005)
+    q, qd, qdd = 3 * np.sin(0.7 * t) + t / 10, 2.1 * np.cos(0.7 * t) + 0.1, -1.47 * np.sin(0.7 * t)
+    wave = lambda q: 0.012 * np.sin(12 * q) + 0.03 * np.cos(42 * q)  # noqa: E731
+    tau = 1e-3 * qdd + 0.01 * qd + 0.02 * np.sign(qd) + wave(q) + 1e-4 * rng.standard_normal(len(t))
+    (tmp_path / "motor.xml").write_text(MOTOR)
+    log = idbench.MotionLog(200.0, q[:, None], tau[:, None], idbench.TorqueChannel("instantaneous"))
+    found = idbench.fit(
+        log, str(tmp_path / "motor.xml"), model="explicit", friction=("standard+cogging:12+cogging:42",), cutoff=40.0
+    )
+    found.write(str(tmp_path / "cogmap.csv"))
+    header, *rows = (tmp_path / "cogmap.csv").read_text().splitlines()
+    assert header == "joint,position,torque,sigma"
+    at, torque, sigma = np.array([[float(x) for x in row.split(",")[1:]] for row in rows]).T
+    assert np.all(np.abs(torque - wave(at)) < 4 * sigma + 1e-5)
+    assert sigma.max() < 1e-3
+    with pytest.raises(idbench.experiments.errors.ExperimentError, match="no joint has cogging"):
+        idbench.fit(log, str(tmp_path / "motor.xml"), model="explicit").write(str(tmp_path / "other-cogmap.csv"))
+
+
+MOTOR = """<mujoco><worldbody><body name="rotor"><joint name="spin" axis="0 0 1" armature="1e-5"/>
+<inertial pos="0 0 0" mass="0.1" diaginertia="1e-3 1e-3 1e-3"/></body></worldbody></mujoco>"""

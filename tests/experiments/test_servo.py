@@ -91,9 +91,9 @@ def test_servo_of_a_bench_is_found_and_written(bench, idbench):
     model = mujoco.MjModel.from_xml_path("out.xml")
     assert model.dof_armature[0] == found["Ia"]
     assert model.nu == 1
-    assert "axis: good: the model holds on other logs" in out
+    assert out.startswith("Result: good (axis): positions off by")
     report = Path("results/report.html").read_text()
-    assert "axis: good: the model holds on other logs" in report
+    assert "Result: good (axis): positions off by" in report
     assert "Positions: new.csv" in report
     assert {"servo/axis/q/measured", "servo/axis/q/simulated", "servo/axis/residual"} <= known([Path("results/recording.rrd")])[
         1
@@ -167,7 +167,7 @@ def test_the_page_takes_an_arm_to_a_model(root, tmp_path, monkeypatch, capfd):
         for line in block.splitlines():
             if not any(word in line for word in (" view ", "mujoco.viewer", "--friction auto")):
                 assert main(shlex.split(line.removeprefix("uv run idbench "))) == 0, line
-    assert "hold on other logs" in capfd.readouterr().out.replace("holds", "hold")
+    assert "of the motion on other logs" in capfd.readouterr().out
     summary = json.loads(Path("runs/servos/summary.json").read_text())
     errors = summary["mujoco_error"]["log.parquet"]
     assert set(errors) == set(summary["joints"])

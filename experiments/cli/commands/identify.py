@@ -1,29 +1,23 @@
 """The command that identifies logs: request, logs, fit, judgement, printed and saved; then views, each of which may fail."""
 
-import tempfile
 from collections.abc import Mapping, Sequence
-from contextlib import ExitStack, closing, nullcontext
-from dataclasses import replace
-from pathlib import Path
+from contextlib import closing, nullcontext
 
 from rich.text import Text
 
 from idbench.experiments.cli.command import command_of, with_own_parts
-from idbench.experiments.cli.commands.follow import Follower
 from idbench.experiments.cli.commands.identify_views import Shown, require_layer, require_targets, view_all
 from idbench.experiments.cli.options.jobs import Identify
 from idbench.experiments.cli.saving import folder_of
-from idbench.experiments.errors import ExperimentError
+from idbench.experiments.errors import ExperimentError, RequirementError
 from idbench.experiments.identification.fit import Fit
 from idbench.experiments.identification.job import fit_of, loaded_logs, notes_of, request_of, summary_of
 from idbench.experiments.identification.logs import delay_method
 from idbench.experiments.identification.reading import DELAY_FOUND, file_of
-from idbench.experiments.identification.request import Request
 from idbench.experiments.inputs import files_of
 from idbench.experiments.judgement.judgement import Judgement, conclusion, judge
 from idbench.experiments.judgement.remedies import checks
 from idbench.experiments.note import noted
-from idbench.experiments.recording.audience import Audience
 from idbench.experiments.reports.estimates import models_in_full
 from idbench.experiments.reports.printed import print_fit, print_held_out
 from idbench.experiments.results.attempts import Attempts
@@ -35,16 +29,12 @@ from idbench.identify.files.log_file import write_log
 
 def identify(options: Identify) -> None:
     """Identify logs, judge the result, save and show it."""
-    page, request = Page(machine=options.json), request_of(with_own_parts(options))
+    page, request, required = Page(machine=options.json), request_of(with_own_parts(options)), _required(options)
     command, log = command_of(options, out=True), file_of(options.log[0]).absolute()
     folder = folder_of(options, options.out) if options.out else None
     require_targets(options, request.robot_model, folder, files_of(options))
     require_layer(options, request.label, command)
-    with ExitStack() as stack:
-        stack.enter_context(closing(page))
-        stack.enter_context(folder.held() if folder else nullcontext())
-        audience = stack.enter_context(options.watching.audience())
-        options = _followed(stack, options, request, audience)
+    with closing(page), folder.held() if folder else nullcontext(), options.watching.audience() as audience:
         with stages_of("identifying"):
             result = fit_of(*loaded_logs(with_own_parts(options), request))
         whole_models = models_in_full(result, options.model is not None)
@@ -75,6 +65,21 @@ def identify(options: Identify) -> None:
             attempts.attempt("summary.json", lambda: _save(folder, page))
             page.end()
             view_all(Shown(page, options, command, judgement, answer, warnings, folder, audience), attempts)
+    if required and (short := judgement.short_of(required)):
+        raise RequirementError(f"--require {options.require}: {short}")
+
+
+def _required(options: Identify) -> float | None:
+    """Share of torque errors that is required [%]."""
+    if options.require is None:
+        return None
+    try:
+        percent = float(options.require.strip().removesuffix("%"))
+    except ValueError:
+        percent = 0.0
+    if not 0 < percent < float("inf"):
+        raise ExperimentError(f"--require {options.require}: give a share of torque errors above 0, as in 2%")
+    return percent
 
 
 def _checked(judgement: Judgement, options: Identify, attempts: Attempts) -> Mapping[str, Sequence[str]]:
@@ -82,20 +87,6 @@ def _checked(judgement: Judgement, options: Identify, attempts: Attempts) -> Map
     with stages_of("checking"):
         delay = delay_method(options.torque_delay) is None
         return attempts.attempt("the checks", lambda: checks(judgement, delay=delay, trials=not options.no_trials)) or {}
-
-
-def _followed(stack: ExitStack, options: Identify, request: Request, audience: Audience | None) -> Identify:
-    """Follow the log until it is complete, if that is asked for; return the options with the complete log."""
-    if options.follow is None:
-        return options
-    if len(options.log) > 1:
-        raise ExperimentError("--follow takes one log, not several")
-    if not 0 < options.follow < float("inf"):
-        raise ExperimentError(f"--follow {options.follow:g} must be above 0: for how long [s] a complete log has not grown")
-    follower = Follower(options.log[0], options, request, audience)
-    follower.follow(options.follow)
-    folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="idbench-"))
-    return replace(options, log=(follower.complete(Path(folder)),))
 
 
 def _show_fit(page: Page, result: Fit, options: Identify, whole: tuple[str, ...]) -> None:

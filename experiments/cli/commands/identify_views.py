@@ -8,7 +8,7 @@ from rich.text import Text
 
 from idbench.experiments.cli.options.jobs import Identify
 from idbench.experiments.errors import ExperimentError, ResultsError
-from idbench.experiments.exports.exports import EXPORTS
+from idbench.experiments.exports.exports import kind_of
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.judgement.judgement import Conclusion, Judgement
 from idbench.experiments.recording.audience import Audience
@@ -101,7 +101,7 @@ def view_all(shown: Shown, attempts: Attempts) -> None:
 
 def _export(shown: Shown, path: Path, told: set[str]) -> None:
     """Write a file for other software, with the parameters of the first model that has an estimate."""
-    export, leading = EXPORTS[path.suffix], shown.judgement.fit.leading
+    export, leading = kind_of(path, "--write"), shown.judgement.fit.leading
     made = export.render(shown.judgement.fit, leading, path)
     if path not in made.texts:  # a folder of files
         folder_for(path, "--write")
@@ -121,11 +121,10 @@ def _export(shown: Shown, path: Path, told: set[str]) -> None:
 def require_targets(options: Identify, robot_model: RobotModel, folder: ResultsFolder | None, read: Sequence[Path]) -> None:
     """Raise ExperimentError if what is asked for cannot be written there; before the work, not after it."""
     for path in options.write:
-        if path.suffix not in EXPORTS:
-            raise ExperimentError(f"--write {path}: its name must end with {', '.join(EXPORTS)}")
+        kind = kind_of(path, "--write")
         if not (folder and folder.goes_beside(path, "--write")):
-            EXPORTS[path.suffix].require_free(path, "--write", force=options.force, read=read)
-        EXPORTS[path.suffix].require(robot_model, path)
-    targets = [path.absolute() for asked in options.write for path in EXPORTS[asked.suffix].paths(asked)]
+            kind.require_free(path, "--write", force=options.force, read=read)
+        kind.require(robot_model, path)
+    targets = [path.absolute() for asked in options.write for path in kind_of(asked, "--write").paths(asked)]
     if twice := next((path for k, path in enumerate(targets) if path in targets[:k]), None):
         raise ResultsError(f"{twice} is to be written twice: give each file a name of its own")

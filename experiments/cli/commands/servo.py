@@ -4,7 +4,6 @@ from contextlib import closing, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
 from rich.text import Text
 
 from idbench.experiments.cli.command import command_of
@@ -15,13 +14,12 @@ from idbench.experiments.inputs import files_of
 from idbench.experiments.recording.audience import Audience
 from idbench.experiments.results.attempts import Attempts
 from idbench.experiments.results.folder import ResultsFolder
-from idbench.experiments.results.page import NOT_SAVED, Page, stages_of
+from idbench.experiments.results.page import COLORS, NOT_SAVED, Page, stages_of
 from idbench.experiments.results.writing import write_text
 from idbench.experiments.servo.job import ServosFit, servos_identified
 from idbench.experiments.servo.joints import Identified
 from idbench.experiments.servo.servo_files import for_mujoco, in_mujoco, inexpressible, mjcf_of, servo_function, without_servo
-from idbench.experiments.servo.servo_text import choice_table, error_line, servo_table
-from idbench.identify.servo.choice import ServoFrictionChoice
+from idbench.experiments.servo.servo_text import servo_table
 
 if TYPE_CHECKING:
     from idbench.experiments.results.attempts import Streams
@@ -34,16 +32,20 @@ def servo(options: IdentifyServo) -> None:
     with options.watching.audience() as audience, closing(page), folder.held() if folder else nullcontext():
         page.found |= {"experiment": "servo", "robot": absolute(str(options.robot)), "friction": options.friction, "joints": {}}
         made = _identified(page, folder, options)
-        for what, each in made.errors.items():
-            for joint, errors in each.items():
-                page.print(Text(error_line(f"{what} logs", joint, errors)), soft_wrap=True)
         page.found |= made.summary()
-        for _, line in made.verdicts:
+        document = made.document()
+        (word, first), *others = document.verdicts
+        page.print(Text(first, f"bold {COLORS.get(word, '')}".strip()), soft_wrap=True)
+        page.print(Text(f"next: {document.step}\n", "bold"), soft_wrap=True)
+        for table in document.tables:
+            table.show(page)
+        for line in (*document.notes, *(line for _, line in others)):
             page.print(Text(line), soft_wrap=True)
+        page.warn(document.warnings)
         page.show()
         save_summary(page, folder)
         with Attempts("the results are printed" + (f", and in {folder.out}" if folder else ""), folder) as attempts:
-            attempts.file("report.html", lambda: made.document().page(command_of(options, out=True)))
+            attempts.file("report.html", lambda: document.page(command_of(options, out=True)))
             for path in options.write:
                 attempts.attempt("--write", lambda path=path: WRITERS[path.suffix](page, options, path, made))  # type: ignore[misc]
             attempts.attempt("summary.json", lambda: save_summary(page, folder))
@@ -57,9 +59,7 @@ def _identified(page: Page, folder: ResultsFolder | None, options: IdentifyServo
     """Return the fits; print and save those of joints that are done if the others are not waited for."""
     last = list[ServosFit]()
 
-    def heard(joint: str, result: Identified | str, made: ServosFit) -> None:
-        if isinstance(result, ServoFrictionChoice):
-            choice_table(joint, result).show(page)
+    def heard(_joint: str, _result: Identified | str, made: ServosFit) -> None:
         last[:] = [made]
         page.found |= made.parameters()
         if page.found["joints"]:
@@ -67,14 +67,11 @@ def _identified(page: Page, folder: ResultsFolder | None, options: IdentifyServo
 
     try:
         with stages_of("identifying"):
-            made = servos_identified(options, heard)
-    finally:
+            return servos_identified(options, heard)
+    except BaseException:
         if last and last[0].fits:
             servo_table(last[0].fits).show(page)
-    for line in made.lines:
-        page.print(Text(line), soft_wrap=True)
-    page.warn(made.warnings)
-    return made
+        raise
 
 
 def _write(page: Page, options: IdentifyServo, path: Path, fit: ServosFit) -> None:
@@ -92,8 +89,8 @@ def _write(page: Page, options: IdentifyServo, path: Path, fit: ServosFit) -> No
         errors = in_mujoco(judged, found, place, log, options.position)
         name = judged.name(log)
         page.found.setdefault("mujoco_error", {})[name] = errors
-        for joint, e in errors.items():
-            page.print(Text(error_line(f"{path.name} in plain MuJoCo, {name}", joint, np.array([e]))), soft_wrap=True)
+        off = ", ".join(f"{joint} {error:.2g}" for joint, error in errors.items())
+        page.print(Text(f"{path.name} in plain MuJoCo, {name}: mean errors of positions [rad]: {off}"), soft_wrap=True)
 
 
 def _write_function(page: Page, options: IdentifyServo, path: Path, fit: ServosFit) -> None:

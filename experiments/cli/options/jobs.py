@@ -55,13 +55,13 @@ class Identify(jobs.IdentifyRequest, RecordedOptions, Command, called="identify"
 
     verbose: Verbose = False
     """Print details, too: noise, Cond(W), correlations, intervals, iterations."""
-    follow: Annotated[float | None, Word("SECONDS")] = None
-    """Identify a CSV log while it is being written, until it has not grown for this time, then as a whole. --live or --serve
-    show estimates and residuals as they develop."""
     write: Files = ()
     """Files to write. The identified robot: .xml, .urdf or .sdf; its joints' actuators: .yaml. For a controller, dynamics and
-    regressors as functions: .c, .py. Base parameters with their covariance: .json. For training, ranges with code: .toml; a
-    folder of robots: .ensemble."""
+    regressors as functions: .c, .py; the joints' cogging: cogmap.csv. Base parameters with their covariance: .json. Robots for
+    training with code: .toml, or in a folder: .ensemble. Parameters for mujoco.sysid: sysid.py."""
+    require: Annotated[str | None, Word("PERCENT")] = None
+    """Exit with code 1 unless held-out torque errors are at most this share, as in 2%, and the log would have shown a torque
+    constant that is 10 % off."""
 
 
 @dataclass(frozen=True, kw_only=True)
