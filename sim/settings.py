@@ -104,7 +104,8 @@ def _complaint(detail: Any, cls: type, where: str) -> str:
     if not where and location and isinstance(location[0], int):  # an argument by its place: its name says more
         location[0] = [*fields_of(cls), *map(str, range(location[0] + 1))][location[0]]
     owner = _owner(cls, [part for part in location[:-1] if isinstance(part, str)])
-    key = ".".join(filter(None, [where, _written(location)]))
+    place = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in location).lstrip(".")  # a.b[0].c
+    key = ".".join(filter(None, [where, place]))
     meaning = description(owner, next((part for part in reversed(location) if isinstance(part, str)), ""))
     if kind in ("unexpected_keyword_argument", "unexpected_positional_argument"):
         known = list(fields_of(owner))
@@ -116,11 +117,6 @@ def _complaint(detail: Any, cls: type, where: str) -> str:
         return ": ".join(filter(None, [key, str(detail["ctx"]["error"])]))
     allowed = str(detail["msg"]).replace("Input should be", "must be").replace("Value error, ", "")
     return f"{key} = {detail['input']!r:.60}: {allowed}" + (f" ({meaning})" if meaning else "")
-
-
-def _written(location: list[Any]) -> str:
-    """Return a place in a document, as a.b[0].c."""
-    return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in location).lstrip(".")
 
 
 def _owner(cls: type, path: list[str]) -> type:

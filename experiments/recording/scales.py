@@ -39,8 +39,9 @@ class AbstractScale(ABC):
 
     @property
     def ticks(self) -> dict[float, str]:
-        """Values that are written beside the axis, as text."""
-        return {float(v): _short(v) for v in self._values() if self.low <= v <= self.high}
+        """Values that are written beside the axis, as text: 1e-5, not 1e-05."""
+        values = [v for v in self._values() if self.low <= v <= self.high]
+        return {float(v): f"{v:.4g}".replace("e-0", "e-").replace("e+0", "e") for v in values}
 
     def _bent(self, x: Array) -> Array:
         """Return values as they are spaced: evenly."""
@@ -138,8 +139,3 @@ def _ends(values: Sequence[npt.ArrayLike], nothing: float = 0.0) -> tuple[float,
 def _widened(low: float, high: float) -> tuple[float, float]:
     room = ROOM * (high - low) or max(abs(low), 1.0)
     return low - room, high + room
-
-
-def _short(value: float) -> str:
-    """Return a value as text: 1e-5, not 1e-05."""
-    return f"{value:.4g}".replace("e-0", "e-").replace("e+0", "e")

@@ -270,6 +270,8 @@ class Joints:
         columns, name = log.columns, f"{log.name}, {self.links.joints[j]}"
         others = columns.on, columns.voltage, columns.forward
         on, voltage, forward = (None if x is None else x[:, j] for x in others)
+        if columns.velocity is not None:  # kd (v - qd)
+            forward = (0.0 if forward is None else forward) + log.servos[j].kd * columns.velocity[:, j]
         low, high = self.links.ranges[j]
         measured = columns.t, columns.q[:, j], columns.command[:, j]
         enabled = None if on is None else on > 0.5

@@ -12,18 +12,20 @@ from typing import Any
 import numpy as np
 
 from idbench.experiments.errors import ExperimentError
+from idbench.experiments.exports.code import template
 from idbench.experiments.servo.identification import Servos
 from idbench.identify.files.servo_file import ServoFile
 from idbench.identify.plugins import did_you_mean
 from idbench.identify.servo import SERVO_FRICTIONS, Servo, ServoFit
+from idbench.identify.servo.fit import require_possible
 from idbench.identify.servo.identification import with_friction
+from idbench.identify.servo.law import PUBLISHED
 from idbench.identify.servo.parameters import SERVO_PARAMETERS, ServoLaw
 from idbench.sim.robot.servos import Commands, ServoValues, replay, with_servos
 
 
 def servo_function(robot: str, fits: Mapping[str, tuple[Servo, ServoFit]], logs: Sequence[str]) -> str:
     """Python file of what is known of each joint's servo, and what was found."""
-    text = files("idbench.experiments.exports").joinpath("servo.py.txt").read_text(encoding="utf-8")
     every = dict[str, dict[str, float]]()
     for joint, (servo, fit) in fits.items():
         known = {name: getattr(servo, name) for name in ("kd", "supply", "limit", "counts", "speed_limit")}
@@ -31,9 +33,44 @@ def servo_function(robot: str, fits: Mapping[str, tuple[Servo, ServoFit]], logs:
         every[joint] = {"gain": servo.slope, **known, **{name: law[name] for name in SERVO_PARAMETERS if name != "backlash"}}
     table = pformat(every, width=110, sort_dicts=False).replace("inf", 'float("inf")')
     words = {"name": robot, "version": version("idbench"), "logs": ", ".join(logs)}
-    for mark, word in {**words, "servos": table}.items():
-        text = text.replace(f"{{{mark}}}", word)
-    return text
+    return template("servo.py").substitute(words, servos=table)
+
+
+BAM = {
+    "armature": "Ia", "friction_base": "Fs", "friction_viscous": "Fv", "friction_stribeck": "Fst", "dtheta_stribeck": "vs",
+    "load_friction_base": "Fl", "load_friction_stribeck": "Fls", "load_friction_motor": "Flm", "load_friction_external": "Fle",
+    "command_delay": "delay", "max_velocity": "rate", "q_offset": "offset",
+}  # fmt: skip
+"""Parameters of BAM (arXiv 2410.08650) -> letters; kt = b / a and R = b / a^2 are behind the gear there, too."""
+
+BAM_LAWS = {"coulomb": "m1", "stribeck": "m2", "load": "m3", "load-stribeck": "m4", "directional": "m5"}
+
+
+def bam_of(fit: ServoFit, model: str) -> str:
+    """Servo as JSON of BAM, which MuJoCo Warp, mjlab and Isaac Lab load; ExperimentError if its law is none of BAM's."""
+    if fit.friction not in BAM_LAWS or fit.servo.kind != Servo.kind:
+        raise ExperimentError(f"BAM has servos of a DC motor with friction {', '.join(BAM_LAWS)}; this is {fit.friction}")
+    p = ServoLaw(**fit.p)._asdict()
+    found = {name: float(p[letter]) for name, letter in BAM.items() if np.isfinite(p[letter])}
+    none = dict.fromkeys(("load_friction_motor_stribeck", "load_friction_external_stribeck"), 0.0)
+    motor = {"kt": p["b"] / p["a"], "R": p["b"] / p["a"] ** 2, "error_gain_ratio": 1 + p["gain_error"], "alpha": 1.0}
+    named = {"model": BAM_LAWS[fit.friction], "actuator": model.lower().replace("-", "")}
+    return json.dumps(named | motor | found | none, indent=1, allow_nan=False) + "\n"
+
+
+def device_of_bam(path: Path) -> dict[str, Any]:
+    """Device of a published JSON of BAM; ExperimentError if it is none."""
+    try:
+        given = json.loads(path.read_text(encoding="utf-8"))
+        a, law = given["kt"] / given["R"], {x: name for name, x in BAM_LAWS.items()}.get(given["model"], given["model"])
+        values = {"a": a, "b": given["kt"] * a} | {x: float(given[name]) for name, x in BAM.items() if name in given}
+        require_possible(values)
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, ZeroDivisionError) as error:
+        raise ExperimentError(f"{path} is no parameter file of BAM (kt, R, armature, model ...): {error}") from error
+    of = {x: {"value": v, "sigma": None, "spread": None, "unit": SERVO_PARAMETERS[x].unit} for x, v in values.items()}
+    model = next((name for name in PUBLISHED if name.lower().replace("-", "") == given.get("actuator")), None)
+    known = {"model": model, "supply": PUBLISHED[model].supply} if model else {}
+    return {"name": path.stem, "source": f"{path}, BAM {given['model']}", "known": known, "friction": law, "parameters": of}
 
 
 EXPRESSIBLE = ("a", "b", "Ia", "Fs", "Fv", "offset", "lag", "lead", "delay", "rate", "backlash")
@@ -116,6 +153,8 @@ def devices() -> dict[str, dict[str, Any]]:
 def device_of(name: str) -> dict[str, Any]:
     """A device; raise ExperimentError if none has this name."""
     every = devices()
+    if name.endswith(".json"):
+        return device_of_bam(Path(name))
     if name not in every:
         raise ExperimentError(f"there is no device {name!r}{did_you_mean(name, every)}; there are {', '.join(every)}")
     return every[name]

@@ -134,7 +134,7 @@ def verdict_lines(
         share = float(np.mean(held_out.get(joint, 0.0))) / max(moved.get(joint, 0.0), TINY)
         worst.append((WORDS.index(word), share, f"Result: {word} ({joint}): {why}"))
     first = max(worst)
-    words = [(joint, mistake_words(mistake)) for joint, mistake in mistakes.items()]
+    words = [(joint, mistake_words(mistake, fits[joint])) for joint, mistake in mistakes.items()]
     alike = [(joint, text) for joint, fit in fits.items() if (text := confounded(fit))]
     lacks = [(joint, _lacks(fit)) for joint, fit in fits.items()]
     rest = [("unsure", line) for some in (words, alike, lacks) for line in of_each(some).values()]
@@ -142,10 +142,13 @@ def verdict_lines(
     return [(WORDS[first[0]], first[2]), *each, *rest]
 
 
-def mistake_words(mistake: Suspect) -> str:
+def mistake_words(mistake: Suspect, fit: ServoFit) -> str:
     """Mistake, its probability, its rivals, and the proved remedy, in words."""
     letter = LETTERS[mistake.cause]
     what = MISTAKEN[letter].format(size=mistake.size[0], factor=1 + mistake.size[0])
+    if letter == "lead" and fit.servo.kd and fit.servo.kind == "torque":
+        kd = fit.servo.slope * mistake.size[0]
+        what = f"kd is {abs(kd):.2g} N m s/rad too {'small' if kd > 0 else 'large'}"
     rivals = ", ".join(LETTERS[cause] for cause, _ in mistake.alternatives)
     others = f"; or {rivals}, which this log cannot distinguish" if rivals else ""
     before, after = mistake.held_out

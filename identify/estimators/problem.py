@@ -169,13 +169,11 @@ class Problem:
             return np.ones(len(self.some_rows.time))
         return np.concatenate([part.weights for part in self.parts], axis=-1)
 
-    @property
+    @cached_property
     def explicit(self) -> "Problem":
         """The problem of the explicit model, whose rows show the noise of the logs."""
-        return self if isinstance(self.model, ExplicitModel) else self._of_explicit
-
-    @cached_property
-    def _of_explicit(self) -> "Problem":
+        if isinstance(self.model, ExplicitModel):
+            return self
         return self._explicit or replace(self, model=ExplicitModel(), _signals=self.signals)
 
     @cached_property

@@ -93,6 +93,8 @@ class LogLayout:
     """Commanded positions of servos."""
     forward: Source = Source()  # frozen
     """What is commanded beside: duty, torque or current."""
+    velocity: Source = Source()  # frozen
+    """Commanded velocities of servos."""
     on: Source = Source()  # frozen
     """Above 0.5 where torque is on."""
     voltage: Source = Source()  # frozen

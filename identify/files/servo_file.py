@@ -49,17 +49,7 @@ class ServoFile:
 
     @classmethod
     def read(cls, path: Path) -> "ServoFile":
-        r"""Content of a file; raise SettingError that names what is unknown or wrong in it.
-
-        Examples
-        --------
-        >>> import tempfile
-        >>> from pathlib import Path
-        >>> path = Path(tempfile.mkdtemp()) / "servo.toml"
-        >>> _ = path.write_text('model = "STS3215"\nsupply = 12.0\nkp = 16\n')
-        >>> ServoFile.read(path).servo("elbow", "log.csv").limit
-        0.97
-        """
+        """Content of a file; raise SettingError that names what is unknown or wrong in it."""
         try:
             stated = tomllib.loads(path.read_text(encoding="utf-8"))
             joints, logs = stated.pop("joints", {}), stated.pop("logs", {})

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -21,6 +22,7 @@ USUAL: Mapping[str, tuple[str, ...]] = {
     "q": ("q*", "position", "observation.state"),
     "command": ("command*", "ctrl*", "action"),
     "forward": ("forward*",),
+    "velocity": ("velocity_command*", "qd_command*", "qd_des*", "dq_des*"),
     "on": ("on*",),
     "voltage": ("voltage*",),
 }
@@ -28,7 +30,7 @@ USUAL: Mapping[str, tuple[str, ...]] = {
 
 NAME_IT = "Name it: --columns command=NAME, a * in it for numbers or names of joints"  # The way out where a column is not found
 
-OPTIONAL = ("forward", "on", "voltage")
+OPTIONAL = ("forward", "velocity", "on", "voltage")
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +53,8 @@ class ServoColumns:
     """Names of joints or actuators that are commanded, where the columns have them."""
     forward: Array | None = None
     """Commanded beside the angle: duty, torque [N m] or current [A], shape (time, joint)."""
+    velocity: Array | None = None
+    """Commanded velocities, which kd multiplies [rad/s], shape (time, joint)."""
 
 
 def read_servo_log(path: Path, asked: Asked = Asked()) -> tuple[ServoColumns, str]:  # noqa: B008  # frozen
@@ -78,7 +82,8 @@ def read_servo_log(path: Path, asked: Asked = Asked()) -> tuple[ServoColumns, st
     if len(q) != len(command):
         raise LogError(f"{path}: {len(q)} samples of positions and {len(command)} of commands: one of each at every time")
     if q.shape != command.shape:
-        raise LogError(f"{path} has {q.shape[1]} columns of positions and {command.shape[1]} of commands: one of each a joint")
+        both = f"{q.shape[1]} columns of positions and {command.shape[1]} of commands: one of each a joint"
+        raise LogError(f"{path} has {both}; of velocities: --columns command=NAME velocity=NAME")
     t = files.times(layout.q, len(q))
     _require_radians(path, layout, {"q": q, "command": command})
     _require_complete(path, {"t": t, **{name: x for name, (x, _) in found.items()}})
@@ -86,12 +91,12 @@ def read_servo_log(path: Path, asked: Asked = Asked()) -> tuple[ServoColumns, st
     said = ""
     if not layout.t.unit and (unit := unit_of_times(t)):
         t, said = t * factor("t", unit), f"{path.name}: times in {unit}, by their size; --units t=s if they are in s"
-    forward, on, voltage = (
+    forward, velocity, on, voltage = (
         np.broadcast_to(found[name][0], q.shape) if name in found and found[name][0].shape[1] in (1, q.shape[1]) else None
         for name in OPTIONAL
     )
     joints = layout.joints or found["q"][1] or found["command"][1]
-    return ServoColumns(t - t[0], q, command, on, voltage, joints, found["command"][1], forward), said
+    return ServoColumns(t - t[0], q, command, on, voltage, joints, found["command"][1], forward, velocity), said
 
 
 def _stated(path: Path, table: LogTable, layout: LogLayout, asked: Asked) -> LogLayout:
@@ -150,8 +155,9 @@ def ordered(columns: ServoColumns, joints: Sequence[str], actuators: Mapping[str
     place = _order(columns, joints, path)
     called = [actuators.get(name, name) for name in columns.commanded]
     own = [called.index(joint) for joint in joints] if set(called) >= set(joints) else place
-    forward, on, voltage = (None if x is None else x[:, place] for x in (columns.forward, columns.on, columns.voltage))
-    return ServoColumns(columns.t, columns.q[:, place], columns.command[:, own], on, voltage, tuple(joints), (), forward)
+    beside: dict[str, Any] = {name: None if (x := getattr(columns, name)) is None else x[:, place] for name in OPTIONAL}
+    q, command = columns.q[:, place], columns.command[:, own]
+    return replace(columns, q=q, command=command, joints=tuple(joints), commanded=(), **beside)
 
 
 def _order(columns: ServoColumns, joints: Sequence[str], path: Path) -> list[int]:

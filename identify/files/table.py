@@ -30,6 +30,7 @@ UNITS: Mapping[str, Mapping[str, float]] = {
     "temperature": {"degC": 1.0},
     "command": POSITIONS,
     "forward": TORQUES,
+    "velocity": VELOCITIES,
     "on": {"1": 1.0},
     "voltage": {"V": 1.0, "mV": 1e-3},
 }

@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Self
 
 import numpy as np
 import numpy.typing as npt
@@ -10,13 +9,10 @@ from scipy.ndimage import median_filter
 
 from idbench.identify.arrays import Array, frozen
 from idbench.identify.data.jumps import encoder_steps
-from idbench.identify.errors import LogError, SettingError, require_positive
+from idbench.identify.errors import LogError, SettingError
 from idbench.identify.servo.law import Servo
 
 PARTS = ("inertia", "sine", "cosine", "rest", "lightness", "shaking")  # Of a load
-
-
-G = 9.81  # Gravity of a pendulum on a bench [m/s^2]
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,20 +48,6 @@ class JointLoad:
             object.__setattr__(self, name, values)
         if (self.inertia < 0).any():
             raise SettingError(f"inertia = {self.inertia.min():g} kg m^2 of a load must not be negative")
-
-    @classmethod
-    def pendulum(cls, mass: float, length: float) -> Self:
-        """A point mass [kg] at a distance [m] from the axis, which is horizontal; q = 0 hangs down.
-
-        Examples
-        --------
-        >>> from idbench.identify.servo import JointLoad
-        >>> round(float(JointLoad.pendulum(0.5, 0.1).sine), 4)
-        0.4905
-        """
-        require_positive(mass=mass, length=length)
-        none = np.array(0.0)
-        return cls(np.array(mass * length**2), np.array(mass * G * length), none, none)
 
     def over(self, t: Array) -> tuple[Array, ...]:
         """Its parts at some times [s], each of their shape."""

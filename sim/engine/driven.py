@@ -14,7 +14,7 @@ from idbench.identify.errors import InvariantError
 from idbench.sim.drives import IdealDrive
 from idbench.sim.engine.batched import BatchedPlant
 from idbench.sim.engine.failures import Bounds
-from idbench.sim.errors import RobotError, ScenarioError
+from idbench.sim.errors import RobotError
 from idbench.sim.robot.inverse_dynamics import BLOCK, InverseDynamics
 from idbench.sim.robot.motors import Array
 from idbench.sim.robot.robot import Robot
@@ -77,37 +77,6 @@ def _replayed(robots: Sequence[Robot], logs: Sequence[MotionLog], qd: Array, ban
     started = _start(robots, logs, np.tile(log.q[0], (nsim, 1)), np.tile(qd[0], (nsim, 1)))
     q, _ = _driven(started, log.samples * np.arange(nsim), log.samples, held)
     return [failed.get(sim) or q[sim] for sim in range(nsim)]
-
-
-def free_run(robot: Robot, log: MotionLog, qd: Array, length: float) -> tuple[Array, Array]:
-    """Return logged and simulated positions of stretches of a log that follow each other, shape (stretch, time, joint).
-
-    Each begins with the position and velocity of the log; nothing holds the robot to its motion.
-
-    Parameters
-    ----------
-    robot, log
-        To be simulated, and one run.
-    qd : Array, shape (time, joint)
-        Velocities of the log [rad/s].
-    length : float
-        Of a stretch [s].
-
-    Raises
-    ------
-    ScenarioError
-        If the log is shorter than a stretch.
-    """
-    samples = round(length * log.fs)
-    count = log.samples // max(samples, 1)
-    if samples < 1:
-        raise ScenarioError(f"a stretch of {length:g} s has no sample at {log.fs:g} Hz: use a longer one")
-    if count < 1:
-        raise ScenarioError(f"a log of {log.samples / log.fs:.3g} s has no stretch of {length:g} s: use a shorter one")
-    first = samples * np.arange(count)
-    simulated, broken = _driven(_start([robot], [log], log.q[first], qd[first]), first, samples)
-    simulated[broken] = np.nan
-    return log.q[: count * samples].reshape(count, samples, -1), simulated
 
 
 def shoot(

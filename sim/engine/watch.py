@@ -105,7 +105,8 @@ class Watcher:
         parts: dict[str, Any] = {name: x[now].copy() for name, x in channels.items()}
         parts["tau"] /= per_sample
         parts["logged"] = self._logged(parts["logged"][None])[0]
-        reference = Reference(self._fs, *(_alone(getattr(planned, x)[now]) for x in ("q", "qd", "qdd")))
+        each = (x if x.ndim == 2 else x[:, 0] for x in (planned.q[now], planned.qd[now], planned.qdd[now]))
+        reference = Reference(self._fs, *each)
         electric, inner = None, None
         every = np.concatenate(self._rows)
         ready = int(np.searchsorted(every[:, 0], final * per_sample))
@@ -117,10 +118,6 @@ class Watcher:
         parts |= {"electric": electric, "inner": inner}
         self._watch.receive(WatchedStretch(self._told - self._skipped, reference, by_position=self._by_position, **parts))
         self._told = final
-
-
-def _alone(x: Array) -> Array:
-    return x if x.ndim == 2 else x[:, 0]
 
 
 @dataclass(frozen=True, eq=False)

@@ -42,7 +42,7 @@ from idbench.experiments.text import SIGMAS
 from idbench.identify import Array, Estimate, IdentificationError, MotionLog
 from idbench.identify.judge.excitation import seen
 from idbench.identify.judge.validation import split
-from idbench.sim.engine.driven import free_run
+from idbench.sim.engine.driven import shoot
 from idbench.sim.errors import BenchError, ScenarioError
 from idbench.sim.settings import NotNegative, make, settings
 
@@ -261,7 +261,12 @@ def repeats(request: Request, logs: dict[str, MotionLog]) -> Row:
 def free_runs(held_out: HeldOut, model: str, length: float) -> Row:
     """NRMSE of positions that are simulated from where the log is: rms of the error over the range of the joint."""
     robot, log, qd = held_out.driven(model)
-    measured, simulated = free_run(robot, log, qd, length)
+    samples = round(length * log.fs)
+    if not 0 < samples <= log.samples:
+        raise ScenarioError(f"a log of {log.samples / log.fs:.3g} s has no stretch of {length:g} s: use another length")
+    first = samples * np.arange(log.samples // samples)
+    measured = log.q[first[:, None] + np.arange(samples)]
+    simulated = shoot(robot, {}, (log.q[first], qd[first]), log, first, samples)
     kept = np.asarray(np.isfinite(simulated).all(axis=(1, 2)))
     squares, whole = (measured[kept] - simulated[kept]) ** 2, np.ptp(log.q, axis=0)
     nrmse = np.sqrt(squares.mean(axis=(0, 1))) / np.where(whole > 0, whole, np.nan) if kept.any() else np.full(log.n, np.nan)

@@ -35,7 +35,8 @@ def read(path):
     file = np.load(path)
     place = {str(name): i for i, name in enumerate(file["columns"])}
     t, q, goal, on = (file["data"][:, :, place[name]].astype(float) for name in ("t", "q", "goal", "torque_enable"))
-    loads = [JointLoad.pendulum(m, x) for m, x in zip(file["mass"], file["length"], strict=True)]
+    none, both = np.array(0.0), zip(file["mass"], file["length"], strict=True)
+    loads = [JointLoad(np.array(m * x**2), np.array(9.81 * m * x), none, none) for m, x in both]
     servos = [replace(SERVO, kp=float(kp)) for kp in file["kp"]]
     runs = [ServoRun(*each, on > 0.5) for *each, on in zip(t, q, goal, loads, servos, on, strict=True)]
     return runs, {name: file[name] for name in ("mass", "length", "kp", "trajectory")}

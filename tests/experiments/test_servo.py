@@ -14,11 +14,12 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
+from builders import pendulum
 
 from idbench.experiments.cli import main
 from idbench.experiments.recording.folder import known
 from idbench.identify.files.servo_file import ServoFile
-from idbench.identify.servo import JointLoad, ServoRun
+from idbench.identify.servo import ServoRun
 from idbench.identify.servo.closed_loop import ServoLoop
 from idbench.identify.servo.parameters import SERVO_PARAMETERS
 from idbench.sim.robot.robot import Robot
@@ -121,7 +122,7 @@ def test_the_python_function_moves_as_the_fit_does(bench, idbench):
         qd = free - min(max(free, -most), most)
         q += h * qd
     stated = ServoFile.read(bench / "servo.toml").servo("axis", "")
-    run = ServoRun(t, 0 * t, u, JointLoad.pendulum(m, x), stated)
+    run = ServoRun(t, 0 * t, u, pendulum(m, x), stated)
     of_file = {name: value for name, value in p.items() if name in SERVO_PARAMETERS}
     expected = ServoLoop([run], h).simulate(of_file)[0, 0]
     assert np.abs(np.array(path) - expected[: len(path)]).mean() < 2 * COUNT

@@ -1,14 +1,17 @@
 """Servos that ship, identified from public logs."""
 
 import json
+from types import SimpleNamespace
 
 import mujoco
 import numpy as np
 import pytest
 
 from idbench.experiments.cli import main
-from idbench.experiments.servo.servo_files import device_of, devices
+from idbench.experiments.errors import ExperimentError
+from idbench.experiments.servo.servo_files import bam_of, device_of, devices, servo_function
 from idbench.identify.files.servo_file import ServoFile
+from idbench.identify.servo import Servo
 
 
 @pytest.mark.parametrize("name", devices())
@@ -47,3 +50,53 @@ def test_files_of_a_device_are_read(idbench, tmp_path):
 def test_devices_are_listed(capsys):
     assert main(["device"]) == 0
     assert "STS3215: GitHub kscalelabs/sysid" in capsys.readouterr().out
+
+
+LAWS = {
+    "coulomb": {},
+    "stribeck": {"Fst": 0.2, "vs": 0.3},
+    "load": {"Fl": 0.15},
+    "load-stribeck": {"Fst": 0.2, "vs": 0.3, "Fl": 0.15, "Fls": 0.05},
+    "directional": {"Fst": 0.2, "vs": 0.3, "Fle": 0.1, "Flm": 0.2},
+}
+
+
+def budget(bam, motor, external, speed):
+    """Friction of BAM's models M1 to M5 (arXiv 2410.08650, section III), by the names of their files."""
+    near = np.exp(-((abs(speed) / bam["dtheta_stribeck"]) ** bam["alpha"])) if bam["model"] not in ("m1", "m3") else 0.0
+    if bam["model"] == "m5":
+        load = abs(bam["load_friction_external"] * external - bam["load_friction_motor"] * motor)
+        more = abs(bam["load_friction_external_stribeck"] * external - bam["load_friction_motor_stribeck"] * motor)
+    else:
+        load, more = (bam[x] * abs(external - motor) for x in ("load_friction_base", "load_friction_stribeck"))
+    return bam["friction_base"] + load + near * (bam["friction_stribeck"] + more)
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_a_file_of_bam_has_the_same_friction_and_comes_back(law, tmp_path, idbench, rng):
+    servo = Servo(gain=0.166, kp=16.0, supply=12.0, limit=0.97, counts=4096)
+    p = {"a": 0.57, "b": 1.18, "Ia": 0.022, "Fs": 0.12, "Fv": 0.02, "offset": 0.0, "delay": 0.02, "rate": 4.8, **LAWS[law]}
+    fit = SimpleNamespace(friction=law, servo=servo, p=p)
+    (tmp_path / "axis.json").write_text(bam_of(fit, "STS3215"))
+    bam, space = json.loads((tmp_path / "axis.json").read_text()), {}
+    assert bam["actuator"] == "sts3215"
+    assert (bam["kt"] / bam["R"], bam["kt"] ** 2 / bam["R"]) == pytest.approx((0.57, 1.18))
+    exec(servo_function("arm", {"axis": (servo, fit)}, ["a.csv"]), space)
+    ours = space["Servo"]("axis", 0.001)
+    for motor, external, speed in rng.normal(size=(50, 3)):
+        assert ours.friction(speed, motor, external) == pytest.approx(budget(bam, motor, external, speed))
+    words = "--robot", "servo_arm", "--joints", "elbow", "--write", tmp_path / "arm.xml"
+    code, out, err = idbench("device", tmp_path / "axis.json", *words)
+    assert code == 0, err
+    assert f"friction law {law}" in out
+    model = mujoco.MjModel.from_xml_path(str(tmp_path / "arm.xml"))
+    assert model.joint("elbow").armature[0] == pytest.approx(0.022)
+
+
+def test_what_is_no_file_of_bam_is_refused(idbench, tmp_path):
+    (tmp_path / "no.json").write_text('{"kt": 1}')
+    code, _, err = idbench("device", tmp_path / "no.json")
+    assert code == 2
+    assert "is no parameter file of BAM" in err
+    with pytest.raises(ExperimentError, match="BAM has servos of a DC motor"):
+        bam_of(SimpleNamespace(friction="gear", servo=Servo(), p={}), "")

@@ -11,10 +11,11 @@ from idbench.experiments.servo import joints as module
 from idbench.experiments.servo.identification import summary_of
 from idbench.experiments.servo.job import held_of
 from idbench.experiments.servo.joints import Joints, JointsLog
-from idbench.experiments.servo.servo_text import value_of
+from idbench.experiments.servo.servo_text import mistake_words, value_of
 from idbench.experiments.study.servo_rows import _joints
-from idbench.identify import IdentificationError
-from idbench.identify.files.servo_log import ServoColumns
+from idbench.identify import IdentificationError, LogError
+from idbench.identify.files.layout import Asked
+from idbench.identify.files.servo_log import ServoColumns, read_servo_log
 from idbench.identify.servo import Servo, identify_again, identify_servo
 from idbench.identify.servo.identification import APART, per_offset
 from idbench.identify.servo.mistakes import mistake_of
@@ -158,3 +159,26 @@ def test_a_joint_whose_load_sets_no_scale_has_neither_gain_nor_offset():
     assert summary_of(fit)["offset"]["value"] is None
     assert value_of(fit, "offset") == "no scale"
     assert mistake_of(fit) is None
+
+
+def test_a_commanded_velocity_is_a_torque_of_kd_beside_the_angle(tmp_path):
+    """As of loops in MIT mode, kp (u - q) + kd (v - qd) + tau; two sets of commands that are not told apart are asked for."""
+    t = np.arange(0, 1, 0.01)
+    q, v, tau = 0.2 * np.sin(5 * t), np.cos(5 * t), 0.1 * t
+    table = np.c_[t, q, q, v, tau]
+    np.savetxt(tmp_path / "a.csv", table, "%.9g", ",", header="t,q1,command1,qd_des1,forward1", comments="")
+    columns, _ = read_servo_log(tmp_path / "a.csv")
+    robot, loop = links("pendulum", PLAIN), Servo(kp=25.0, kd=0.6, kind="torque")
+    ((run,),) = Joints(robot, (JointsLog("a.csv", columns, (loop,), robot),)).runs
+    np.testing.assert_allclose(run.forward, tau + 0.6 * v, atol=1e-8)
+    np.savetxt(tmp_path / "b.csv", table, "%.9g", ",", header="t,q1,command_q1,command_v1,forward1", comments="")
+    with pytest.raises(LogError, match=r"1 columns of positions and 2 of commands.*velocity=NAME"):
+        read_servo_log(tmp_path / "b.csv")
+    asked = Asked(None, {"command": ("command_q1",), "velocity": ("command_v1",)}, {"velocity": "rad/s"}, {})
+    np.testing.assert_allclose(read_servo_log(tmp_path / "b.csv", asked)[0].velocity[:, 0], v, atol=1e-8)
+
+
+def test_a_wrong_kd_is_called_kd():
+    mistake = SimpleNamespace(cause="lead", size=(-0.0557,), p=1e-9, alternatives=(), held_out=(0.06, 0.0005))
+    fit = SimpleNamespace(servo=Servo(kp=25.0, kd=3.0, kind="torque"))
+    assert mistake_words(mistake, fit).startswith("kd is 1.4 N m s/rad too large (p = 1e-09); with --find lead")

@@ -7,6 +7,7 @@ import mujoco
 import numpy as np
 
 from idbench.identify import BaseParameters, KinematicTree, MotionLog, State, tree_basis
+from idbench.identify.servo import JointLoad
 from idbench.sim.encoders import IncrementalEncoder
 from idbench.sim.engine.simulation import simulate
 from idbench.sim.robot.robot import Robot
@@ -93,3 +94,9 @@ def defects(block, names, q, qd, qdd):
     implicit = matrix(rate(block.momentum, q, qd, qdd), n, names, times) + matrix(block.remainder(state), n, names, times)
     power = matrix(rate(block.energy, q, qd, qdd), 1, names, times) + matrix(block.dissipation(state), 1, names, times)
     return np.abs(D - implicit).max(), np.abs(np.einsum("jk,kjp->kp", qd, D) - power[:, 0]).max()
+
+
+def pendulum(mass, length):
+    """Load of a point mass [kg] at a distance [m] from a horizontal axis; q = 0 hangs down."""
+    none = np.array(0.0)
+    return JointLoad(np.array(mass * length**2), np.array(mass * 9.81 * length), none, none)

@@ -7,7 +7,7 @@ import pytest
 
 from idbench.identify.errors import InvariantError
 from idbench.sim.engine.batched import BatchedPlant
-from idbench.sim.engine.driven import free_run, physics_of, replays
+from idbench.sim.engine.driven import physics_of, replays, shoot
 from idbench.sim.engine.simulation import simulate
 from idbench.sim.errors import RobotError
 from idbench.sim.robot.robot import Robot
@@ -20,6 +20,13 @@ from idbench.sim.trajectories import RandomMoves
 def log():
     scenario = load("ideal")
     return simulate(replace(scenario, trajectory=RandomMoves(moves=4, durations=(0.8, 1.2), rest=0.2))).alone()
+
+
+def free_run(robot, log, qd, length):
+    """Return logged and simulated positions of stretches of a log that follow each other, shape (stretch, time, joint)."""
+    samples = round(length * log.fs)
+    first = samples * np.arange(log.samples // samples)
+    return log.q[first[:, None] + np.arange(samples)], shoot(robot, {}, (log.q[first], qd[first]), log, first, samples)
 
 
 def test_the_robot_that_was_logged_follows_its_own_torques(log):

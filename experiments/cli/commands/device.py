@@ -1,5 +1,8 @@
 """Servos that were identified from public logs, and files of them."""
 
+from collections.abc import Mapping
+from typing import Any
+
 from rich.text import Text
 
 from idbench.experiments.cli.options.tools import ShowDevice
@@ -30,9 +33,9 @@ def device(options: ShowDevice) -> None:
             page.print(Text(f"{name}: {known['source']}"), soft_wrap=True)
         page.close()
         return
-    page.found |= device_of(options.name)
-    _print(page, options.name)
     known, places = device_of(options.name), [names.index(joint) for joint in options.joints or names]
+    page.found |= known
+    _print(page, known)
     for path in options.write:
         text, said = servo_toml_of(known), "what is known of it, for idbench servo --servo"
         if path.suffix == ".xml":
@@ -44,15 +47,14 @@ def device(options: ShowDevice) -> None:
     page.close()
 
 
-def _print(page: Page, name: str) -> None:
-    known = device_of(name)
+def _print(page: Page, known: Mapping[str, Any]) -> None:
     grid = new_table("", ["value", "unit", "spread between units"])
     for letter, of in known["parameters"].items():
         spread = "" if of["spread"] is None else f"{of['spread']:.2g}"
         grid.add_row(letter, concise(of["value"], of["sigma"] or 0.0), of["unit"], spread)
-    units = f"{known['units']} unit{'s' if known['units'] > 1 else ''}"
-    print_titled(page, f"{name}, {units}, friction law {known['friction']}", grid)
+    print_titled(page, f"{known['name']}, friction law {known['friction']}", grid)
     page.print(Text(known["source"]), soft_wrap=True)
-    page.print(f"mean error of the position in runs that fits did not see: {known['held_out_error']:.2g} rad", soft_wrap=True)
-    if known["units"] == 1:
+    if (off := known.get("held_out_error")) is not None:
+        page.print(f"mean error of the position in runs that fits did not see: {off:.2g} rad", soft_wrap=True)
+    if known.get("units") == 1:
         page.print("one unit was logged: what others of the same model differ by is not known", soft_wrap=True)

@@ -18,7 +18,15 @@ from idbench.experiments.results.page import COLORS, NOT_SAVED, Page, stages_of
 from idbench.experiments.results.writing import write_text
 from idbench.experiments.servo.job import ServosFit, servos_identified
 from idbench.experiments.servo.joints import Identified
-from idbench.experiments.servo.servo_files import for_mujoco, in_mujoco, inexpressible, mjcf_of, servo_function, without_servo
+from idbench.experiments.servo.servo_files import (
+    bam_of,
+    for_mujoco,
+    in_mujoco,
+    inexpressible,
+    mjcf_of,
+    servo_function,
+    without_servo,
+)
 from idbench.experiments.servo.servo_text import servo_table
 
 if TYPE_CHECKING:
@@ -101,7 +109,15 @@ def _write_function(page: Page, options: IdentifyServo, path: Path, fit: ServosF
     page.print(Text(f"written to {path}: the servos as a Python file"), soft_wrap=True)
 
 
-WRITERS = {".xml": _write, ".py": _write_function}
+def _write_bam(page: Page, options: IdentifyServo, path: Path, fit: ServosFit) -> None:
+    model = str(fit.servos.known.stated.get("model", "custom"))
+    for joint, own in fit.fits.items():
+        target = path if len(fit.fits) == 1 else path.with_name(f"{path.stem}_{joint}.json")
+        write_text(target, bam_of(own, model), "--write", force=options.force, read=files_of(options))
+        page.print(Text(f"written to {target}: the servo of {joint} for BAM"), soft_wrap=True)
+
+
+WRITERS = {".xml": _write, ".py": _write_function, ".json": _write_bam}
 """What writes servos, by the ending of the name."""
 
 

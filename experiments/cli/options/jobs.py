@@ -124,7 +124,7 @@ class IdentifyServo(jobs.ServoRequest, RecordedOptions, Command, called="servo",
 
     write: Files = ()
     """Files to write: .xml, the robot's MJCF with these servos as actuators, measured on a log in plain MuJoCo; .py, the servos
-    as a Python file (class `Servo`), for your own simulator."""
+    as a Python file (class `Servo`), for your own simulator; .json, parameters of BAM, a file a joint."""
     position: bool = False
     """Write `position` actuators instead of `dcmotor`, for older versions of MuJoCo."""
 

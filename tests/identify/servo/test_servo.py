@@ -5,6 +5,7 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 import pytest
+from builders import pendulum
 
 from idbench.identify import ExcitationError, IdentificationError, LogError, SettingError
 from idbench.identify.servo import JointLoad, Servo, ServoRun, identify_servo
@@ -54,7 +55,7 @@ def simulated(kp: float, seed: int, seconds: float = 8.0, mass: float = MASS) ->
         mujoco.mj_step(model, data)
     every = round(0.01 / H)
     counted = np.round(q[::every] / SERVO.count) * SERVO.count
-    return ServoRun(t[::every], counted, command_at(t[::every], seed), JointLoad.pendulum(MASS, LENGTH), replace(SERVO, kp=kp))
+    return ServoRun(t[::every], counted, command_at(t[::every], seed), pendulum(MASS, LENGTH), replace(SERVO, kp=kp))
 
 
 @pytest.fixture(scope="module")
@@ -136,7 +137,7 @@ RESTING = [0, 2, 2.5, 4, 4.5, 6]
 
 
 def pieces_of(q, command, settled=0.03):
-    run = ServoRun(np.arange(len(q)) * 0.01, q, command, JointLoad.pendulum(0.5, 0.1), SERVO)
+    run = ServoRun(np.arange(len(q)) * 0.01, q, command, pendulum(0.5, 0.1), SERVO)
     return pieces(run, settled)
 
 

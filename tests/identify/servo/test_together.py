@@ -5,8 +5,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from builders import pendulum
 
-from idbench.identify.servo import JointLoad, Servo, ServoFit, ServoRun
+from idbench.identify.servo import Servo, ServoFit, ServoRun
 from idbench.identify.servo.closed_loop import ServoLoop
 from idbench.identify.servo.identification import OffsetJoint, together
 from idbench.identify.servo.parameters import SERVO_PARAMETERS
@@ -107,7 +108,7 @@ def test_offsets_that_agree_stay_within_the_range_of_the_joint():
     """Its encoder spans 2 rad of a range of 2.2 rad: an offset of more than 0.1 rad is beyond a stop."""
     t = np.arange(100) / 100
     q = np.cos(2 * np.pi * t)
-    run = ServoRun(t, q, q, JointLoad.pendulum(0.5, 0.1), Servo(), range=(-1.1, 1.1))
+    run = ServoRun(t, q, q, pendulum(0.5, 0.1), Servo(), range=(-1.1, 1.1))
     one, other = replace(fit_of(covariance()), loop=ServoLoop([run], 1e-3)), fit_of(covariance())
     pair = {0: OffsetJoint(one, {1: np.array([0.0, 1.0, 0.0])}), 1: OffsetJoint(other, {})}
     for way in (-5.0, 5.0):

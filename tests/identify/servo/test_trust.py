@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import scipy
+from builders import pendulum
 
 from idbench.identify.servo import SERVO_FRICTIONS, JointLoad, Servo, ServoRun, identify_again, identify_servo
 from idbench.identify.servo.choice import choose_friction, residuals_by_state
@@ -22,7 +23,7 @@ def simulated(seed: int, load: JointLoad | None = None, **law: float) -> ServoRu
     t = np.arange(0, 14, 0.01)
     command = rng.uniform(-1.3, 1.3, 14)[t.astype(int)]
     on = ~(((t > 4) & (t < 5)) | ((t > 9) & (t < 10))) if load is None else None
-    run = ServoRun(t, np.linspace(0, 1e-3, len(t)), command, load or JointLoad.pendulum(0.6, 0.12), SERVO, on)
+    run = ServoRun(t, np.linspace(0, 1e-3, len(t)), command, load or pendulum(0.6, 0.12), SERVO, on)
     q = ServoLoop([replace(run, q=0 * t)], 2.5e-4).simulate(LAW | law)[0, 0]
     return replace(run, q=np.rint(q / SERVO.count) * SERVO.count)
 
@@ -54,7 +55,7 @@ def test_spikes_of_the_bus_are_left_out(run, fit):
 def test_a_joint_that_rests_and_flickers_has_no_spikes():
     t = np.arange(0, 1, 0.01)
     q = SERVO.count * (np.arange(100) % 7 == 0)
-    assert ServoRun(t, q, 0 * t, JointLoad.pendulum(0.6, 0.12), SERVO).read_well.all()
+    assert ServoRun(t, q, 0 * t, pendulum(0.6, 0.12), SERVO).read_well.all()
 
 
 @pytest.mark.thorough
@@ -101,7 +102,7 @@ def test_a_fit_says_where_it_lacks(fit):
 def test_a_light_rotor_is_not_taken_for_a_late_command(seed):
     """With a link of a tenth of the torque, searches from the rows alone end without an armature, at twice the delay."""
     # So light a load may leave the scale open, not the delay.
-    fit = identify_servo([simulated(seed, JointLoad.pendulum(0.1, 0.06))], "coulomb")
+    fit = identify_servo([simulated(seed, pendulum(0.1, 0.06))], "coulomb")
     assert abs(fit.p["delay"] - LAW["delay"]) < 3 * fit.standard_errors["delay"]
     assert fit.p["Ia"] / fit.p["a"] == pytest.approx(LAW["Ia"] / LAW["a"], rel=0.02)  # the other valley has no Ia
     assert fit.p["a"] == pytest.approx(LAW["a"], rel=0.06)  # a search of all parameters ended 11 % away
@@ -132,7 +133,7 @@ def test_a_parameter_of_a_further_law_may_be_known(run):
 @pytest.mark.thorough
 def test_a_joint_of_which_the_load_does_not_set_the_scale_says_so():
     """A load of a fiftieth of the friction: half as much again of all torques moves the joint nearly alike."""
-    run = simulated(3, JointLoad.pendulum(0.02, 0.03))
+    run = simulated(3, pendulum(0.02, 0.03))
     fit = identify_servo([run], "coulomb")
     assert not fit.scaled
     assert fit.factor[0] < LAW["a"] / fit.p["a"] < fit.factor[1]
@@ -171,7 +172,7 @@ def test_gravity_that_the_file_lacks_needs_a_torque_that_is_known(run):
 
 @pytest.mark.thorough
 def test_a_friction_next_to_nothing_sets_no_scale():
-    assert not identify_servo([simulated(2, JointLoad.pendulum(0.1, 0.06))], "coulomb", held={"Fs": 1e-6}).scaled
+    assert not identify_servo([simulated(2, pendulum(0.1, 0.06))], "coulomb", held={"Fs": 1e-6}).scaled
 
 
 @pytest.mark.thorough
