@@ -85,7 +85,7 @@ def sysid_text(written: WrittenRobot, about: str) -> str:
     joints = dict[str, dict[str, tuple[float, float, float]]]()
     for j, joint in enumerate(written.fit.robot_model.robot.joints):
         for key, letters in FIELDS.items():
-            x, off = written.values.get(name := named(letters, j), 0.0), NORMAL * written.sigma.get(name, 0.0)
+            x, off = written.values.get(name := named(letters, j), 0.0), NORMAL * np.nan_to_num(written.sigma.get(name, 0.0))
             joints.setdefault(joint, {})[key] = x, max(x - off, 0.0), x + off
     return SYSID.substitute(about=about.replace("\\", "/").replace('"', "'"), joints=pformat(joints))
 

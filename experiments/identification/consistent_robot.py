@@ -9,13 +9,13 @@ import numpy as np
 
 from idbench.experiments.identification.consistent_estimate import consistent_of
 from idbench.experiments.identification.fit import Fit
-from idbench.identify import Array, Consistent
+from idbench.identify import Array, Consistent, IdentificationError
 from idbench.identify.basis.block import FRICTION, named
 from idbench.sim.robot.rewrite import compiled, rewritten
 from idbench.sim.robot.robot import Robot
 
 LITTLE = 0.1  # Differences of torques of less than so many per cent are not named
-MUCH = 2.0  # Times the mass of the file, or a share of it, beyond which a link is named: CAD is off by a third at most
+FAR = 2.0  # Times the file's mass, or share of it, beyond which a link is named: CAD is off by a third at most
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,17 +51,17 @@ class WrittenRobot:
             return "log" if name in self.sigma else "stated" if name in self.values else "file"
         return "sum" if self.fit.robot_model.grouping.K[:, self.consistent.names.index(name)].any() else "file"
 
-    @cached_property
+    @property
     def strayed(self) -> list[str]:
-        """Links whose mass is far from the file's."""
-        found, joints = self.consistent, self.fit.robot_model.robot.joints
-        places = [(found.names.index(name), joint) for j, joint in enumerate(joints) if (name := named("M", j)) in found.names]
-        pairs = [(joint, found.standard[k], found.given[k]) for k, joint in places]
-        return [
-            f"the link of {joint} has {mass:.3g} kg, {of_file:.3g} in the robot's file"
-            for joint, mass, of_file in pairs
-            if not of_file / MUCH <= mass <= MUCH * of_file
-        ]
+        """Links whose mass is far from the file's; none where no robot is consistent, which is said when it is written."""
+        try:
+            found = self.consistent
+        except (IdentificationError, np.linalg.LinAlgError):
+            return []
+        joints = {named("M", j): joint for j, joint in enumerate(self.fit.robot_model.robot.joints)}
+        masses = [x for x in zip(found.names, found.standard, found.given, strict=True) if x[0] in joints]
+        far = [(joints[name], m, of) for name, m, of in masses if of > 0 and not of / FAR <= m <= FAR * of]
+        return [f"the link of {joint} has {mass:.3g} kg, {filed:.3g} in the robot's file" for joint, mass, filed in far]
 
     def text(self, folder: Path | None = None) -> str:
         """Return the file, to stand in a folder; in that of the robot's own file by default."""

@@ -16,6 +16,8 @@ from noisy_logs import noisy_log
 import idbench
 from idbench.experiments.exports.ensemble import Ensemble
 from idbench.experiments.exports.ranges import table_of
+from idbench.experiments.identification.consistent_robot import WrittenRobot
+from idbench.identify import IdentificationError
 from idbench.identify.data.kinematics import INERTIAL
 from idbench.sim.robot.inverse_dynamics import inverse_dynamics
 from idbench.sim.robot.rewrite import rewritten
@@ -275,3 +277,21 @@ def test_ranges_hold_the_truth_and_what_no_log_shows_has_none(tmp_path):
     assert ("armature", 3, "log") in sources
     assert len(held) > 50
     assert np.mean(held) > 0.9
+
+
+def test_a_link_that_leaves_its_file_is_named_and_one_that_cannot_be_takes_nothing(monkeypatch):
+    """A file whose last link has a fifth of the mass; where no robot is consistent, the verdict stands without the line."""
+    found = idbench.fit(noisy_log("puma560", 1), "puma560", validate=noisy_log("puma560", 2), model="explicit")
+    written = WrittenRobot(found.fit, "explicit")
+    assert written.strayed == []
+    given = written.consistent.given.copy()
+    given[written.consistent.names.index("M3")] /= 5
+    written.__dict__["consistent"] = replace(written.consistent, given=given)
+    (line,) = written.strayed
+    assert line.startswith("the link of joint3 has 4.8")
+
+    def impossible(*_, **__):
+        raise IdentificationError("no such bodies")
+
+    monkeypatch.setattr("idbench.experiments.identification.consistent_estimate.consistent_parameters", impossible)
+    assert WrittenRobot(found.fit, "explicit").strayed == []
