@@ -14,7 +14,7 @@ from idbench.experiments.errors import ExperimentError
 from idbench.experiments.exports.c_code import c_texts
 from idbench.experiments.exports.code import Content
 from idbench.experiments.exports.functions import require_formulas
-from idbench.experiments.exports.joint_files import actuators_text, cogging_map, require_cogging, sysid_text
+from idbench.experiments.exports.joint_files import actuators_text, cogging_map, sysid_text
 from idbench.experiments.exports.python_code import python_text
 from idbench.experiments.identification.consistent_robot import WrittenRobot
 from idbench.experiments.identification.fit import Fit
@@ -227,9 +227,12 @@ def drawn(fit: Fit, model: str, path: Path) -> Exported:
     from idbench.experiments.exports import ranges
     from idbench.experiments.exports.ensemble import ensemble_of, notes, robot_texts
 
-    robots = ensemble_of(fit, model)
-    texts = robot_texts(robots, path) if path.suffix == FOLDER else ranges.texts(robots, path)
-    return Exported(texts, WrittenRobot(fit, model).warnings, notes(robots))
+    robots, written = ensemble_of(fit, model), WrittenRobot(fit, model)
+    if path.suffix == FOLDER:
+        return Exported(robot_texts(robots, path), written.warnings, notes(robots))
+    drives = missing(written, ("Ia", "Fv", "Fs", "Fsx", "K"), coupled=True) or missing(written, ("K",))
+    lost = [f"springs, and drives that turn with several joints, stay as in the file: {drives}"] if drives else []
+    return Exported(ranges.texts(robots, path), [*written.warnings, *lost], notes(robots))
 
 
 def sysid_parameters(fit: Fit, model: str, path: Path) -> Exported:
@@ -265,7 +268,7 @@ EXPORTS: dict[str, FileKind] = {
     ".yaml": FileKind("values of the joints' actuators", actuators, require_written_back),
     ".json": FileKind("base parameters and regressor", base_parameters, lambda *_: None),
     "sysid.py": FileKind("parameters for mujoco.sysid", sysid_parameters, require_written_back),
-    "cogmap.csv": FileKind("the joints' cogging", lambda *of: Exported({of[2]: cogging_map(*of)}), require_cogging),
+    "cogmap.csv": FileKind("the joints' cogging", lambda *of: Exported({of[2]: cogging_map(*of)}), lambda *_: None),
     ".py": FileKind("dynamics and regressors in Python", python_module, require_functions),
     ".c": FileKind("dynamics and regressors in C, with their header,", c_source, require_functions, (".h",)),
     ".toml": FileKind("robots drawn from what is not known, with code for training,", drawn, require_written_back, CODE),

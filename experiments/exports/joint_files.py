@@ -12,7 +12,6 @@ import numpy as np
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.consistent_robot import WrittenRobot
 from idbench.experiments.identification.fit import Fit
-from idbench.experiments.identification.robot_model import RobotModel
 from idbench.identify.basis.block import named
 from idbench.sim.robot.tree import standard_parameters
 
@@ -85,19 +84,14 @@ def sysid_text(written: WrittenRobot, about: str) -> str:
     joints = dict[str, dict[str, tuple[float, float, float]]]()
     for j, joint in enumerate(written.fit.robot_model.robot.joints):
         for key, letters in FIELDS.items():
-            x, off = written.values.get(name := named(letters, j), 0.0), NORMAL * np.nan_to_num(written.sigma.get(name, 0.0))
+            x, sigma = float(written.values.get(name := named(letters, j), 0.0)), written.sigma.get(name, 0.0)
+            off = NORMAL * sigma if np.isfinite(sigma) else 0.0
             joints.setdefault(joint, {})[key] = x, max(x - off, 0.0), x + off
     return SYSID.substitute(about=about.replace("\\", "/").replace('"', "'"), joints=pformat(joints))
 
 
 WAVE = re.compile(r"C([\d.]+)([sc])")  # Letters of the amplitude of a wave: waves a turn, sine or cosine
 POINTS = 3600  # In a turn: 40 in each of the 90 waves that are looked for at most
-
-
-def require_cogging(robot_model: RobotModel, path: Path) -> None:
-    """Raise ExperimentError if no joint has cogging; where laws are chosen by the log, that is known later."""
-    if not robot_model.laws.auto and not any(WAVE.fullmatch(p.symbol) for p in robot_model.basis.parameters):
-        raise ExperimentError(f"{path}: no joint has cogging: add it, as in --friction standard+cogging:12, or --friction auto")
 
 
 def cogging_map(fit: Fit, model: str, path: Path) -> str:
@@ -108,7 +102,7 @@ def cogging_map(fit: Fit, model: str, path: Path) -> str:
         (p.joint, k, float(of[1]), np.sin if of[2] == "s" else np.cos) for p, k in places if (of := WAVE.fullmatch(p.symbol))
     ]
     if not waves:
-        raise ExperimentError(f"{path}: no cogging was found")
+        raise ExperimentError(f"{path}: no joint has cogging: add it, as in --friction standard+cogging:12, or --friction auto")
     q, lines = np.linspace(0, 2 * np.pi, POINTS, endpoint=False), ["joint,position,torque,sigma"]
     for j, joint in enumerate(fit.robot_model.robot.joints):
         if own := [wave for wave in waves if wave[0] == j]:

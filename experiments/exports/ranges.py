@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import tomli_w
 
+from idbench.experiments.errors import ExperimentError
 from idbench.experiments.exports.code import template
 from idbench.experiments.exports.ensemble import DRAWS, LENGTH, NORMAL, Ensemble, FreeRuns, fields_of
 from idbench.experiments.identification.consistent_robot import WrittenRobot
@@ -96,7 +97,10 @@ def bodies_of(ensemble: Ensemble) -> dict[str, int]:
     """Return the numbers of MuJoCo's bodies that joints move, and of those that are welded to them, by their names."""
     robot = ensemble.fit.robot_model.robot
     links, model = set(robot.model.jnt_bodyid[: robot.n].tolist()), robot.model
-    return {model.body(k).name or f"body{k}": k for k in range(1, model.nbody) if int(model.body_weldid[k]) in links}
+    found = {model.body(k).name: k for k in range(1, model.nbody) if int(model.body_weldid[k]) in links}
+    if "" in found:
+        raise ExperimentError("a link of the robot's file has no name, by which code could find it: name its body")
+    return found
 
 
 def _value(ensemble: Ensemble, written: WrittenRobot, name: str) -> dict[str, Any]:

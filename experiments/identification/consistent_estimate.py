@@ -7,6 +7,7 @@ import numpy as np
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.identify import Array, Consistent, Estimate, consistent_parameters
 from idbench.identify.arrays import TINY
+from idbench.identify.basis.block import BODY
 from idbench.identify.parameters.bodies import exist
 from idbench.identify.parameters.consistent import least_change
 from idbench.identify.telling import stage
@@ -48,11 +49,13 @@ def _places(robot_model: RobotModel, estimate: Estimate) -> list[int]:
 
 
 def _of_all(robot_model: RobotModel, estimate: Estimate) -> tuple[Array, Array]:
-    """Return estimate and covariance with the parameters that were left out: they are zero, and known to be."""
+    """Return estimate and covariance with those that were left out: known to be zero; in poses, bodies' as in the file."""
     C = estimate.within_covariance  # the scatter between logs is not known of combinations
     place = _places(robot_model, estimate)
-    p = len(robot_model.grouping.names)
-    X, sure = np.zeros(p), SURE * np.sqrt(np.diagonal(C).min())
-    whole = sure**2 * np.eye(p)
+    sure = SURE * np.sqrt(np.diagonal(C).min())
+    poses = estimate.problem.logs[0].poses
+    bodies = np.array([poses and parameter.kind in BODY for parameter in robot_model.grouping.parameters])
+    X = np.where(bodies, robot_model.grouping.base(robot_model.filed), 0.0)
+    whole = np.diag(np.where(bodies, np.abs(X) + sure, sure) ** 2)
     X[place], whole[np.ix_(place, place)] = estimate.X, C
     return X, whole

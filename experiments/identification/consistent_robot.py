@@ -59,8 +59,9 @@ class WrittenRobot:
         except (IdentificationError, np.linalg.LinAlgError):
             return []
         joints = {named("M", j): joint for j, joint in enumerate(self.fit.robot_model.robot.joints)}
-        masses = [x for x in zip(found.names, found.standard, found.given, strict=True) if x[0] in joints]
-        far = [(joints[name], m, of) for name, m, of in masses if of > 0 and not of / FAR <= m <= FAR * of]
+        own = self.fit.robot_model.filed == found.given  # without bodies whose size is assumed
+        masses = zip(found.names, found.standard, found.given * own, strict=True)
+        far = [(joints[x], m, of) for x, m, of in masses if x in joints and of > 0 and not of / FAR <= m <= FAR * of]
         return [f"the link of {joint} has {mass:.3g} kg, {filed:.3g} in the robot's file" for joint, mass, filed in far]
 
     def text(self, folder: Path | None = None) -> str:

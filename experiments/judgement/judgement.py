@@ -72,12 +72,10 @@ class Judgement:
         """What falls short of torque errors of this share on every held-out log; empty if nothing does."""
         if not self.held_out:
             return "it was judged on no held-out log"
-        worst, gains = max(_worst(one) for one in self.held_out), self.fit.hidden_gains
-        if worst > percent:
+        if (worst := max(_worst(one) for one in self.held_out)) > percent:
             return f"torque errors of {error_percentage(worst)} on a held-out log"
-        if gains is None or not np.max(gains) <= WEAK:
-            return "the log would not show a torque constant that is 10 % off"
-        return ""
+        hidden, joint = _hidden(self.fit)
+        return f"the log would not show a torque constant of {joint} that is 10 % off" if not hidden <= WEAK else ""
 
     def summary(self) -> dict[str, Any]:
         """Its part of summary.json, beside the fit's own."""
@@ -93,6 +91,12 @@ def _place(one: HeldOut) -> int:
 def _worst(one: HeldOut) -> float:
     """Largest torque error of a joint, by the leading model [%]."""
     return float(np.nanmax(np.nan_to_num(one.torques[one.fit.leading].percent, nan=0.0, posinf=np.inf)))
+
+
+def _hidden(fit: Fit) -> tuple[float, str]:
+    """Largest error of a torque constant that would not be seen, and its joint; 0 where none moves, or a log is too long."""
+    gains = zip(() if fit.hidden_gains is None else fit.hidden_gains, fit.robot_model.robot.joints, strict=False)
+    return max(((float(x), joint) for x, joint in gains if joint not in fit.still), default=(0.0, ""))
 
 
 def judge(result: Fit) -> Judgement:
@@ -169,12 +173,10 @@ def _finding(judgement: Judgement, causes: Sequence[Cause]) -> str:
 
 def _power(fit: Fit) -> Iterator[str]:
     """Yield what a good result would have seen, and of which joints nothing is known."""
-    joints = fit.robot_model.robot.joints
     if still := fit.still:
         yield f"nothing is known of {', '.join(still)}: no motion"
-    if fit.hidden_gains is not None and len(still) < len(joints):
-        some = [(x, joint) for x, joint in zip(fit.hidden_gains, joints, strict=True) if joint not in still]
-        worst, joint = max(some)
+    worst, joint = _hidden(fit)
+    if joint:
         if not worst < 1:
             yield f"it cannot see a wrong torque constant of {joint}"
         elif worst > WEAK:

@@ -17,9 +17,7 @@ from idbench.experiments.servo.identification import Servos
 from idbench.identify.files.servo_file import ServoFile
 from idbench.identify.plugins import did_you_mean
 from idbench.identify.servo import SERVO_FRICTIONS, Servo, ServoFit
-from idbench.identify.servo.fit import require_possible
 from idbench.identify.servo.identification import with_friction
-from idbench.identify.servo.law import PUBLISHED
 from idbench.identify.servo.parameters import SERVO_PARAMETERS, ServoLaw
 from idbench.sim.robot.servos import Commands, ServoValues, replay, with_servos
 
@@ -46,31 +44,20 @@ BAM = {
 BAM_LAWS = {"coulomb": "m1", "stribeck": "m2", "load": "m3", "load-stribeck": "m4", "directional": "m5"}
 
 
-def bam_of(fit: ServoFit, model: str) -> str:
-    """Servo as JSON of BAM, which MuJoCo Warp, mjlab and Isaac Lab load; ExperimentError if its law is none of BAM's."""
-    if fit.friction not in BAM_LAWS or fit.servo.kind != Servo.kind:
-        raise ExperimentError(f"BAM has servos of a DC motor with friction {', '.join(BAM_LAWS)}; this is {fit.friction}")
+def bam_of(fit: ServoFit, model: str) -> tuple[str, list[str]]:
+    """Servo as JSON of BAM, and the letters that it leaves out; ExperimentError if BAM has no such servo."""
     p = ServoLaw(**fit.p)._asdict()
+    if fit.friction not in BAM_LAWS or fit.servo.kind != Servo.kind or not model or min(p["a"], p["b"]) <= 0:
+        raise ExperimentError(
+            f"BAM has DC motors, of a model that servo.toml names, with friction {', '.join(BAM_LAWS)}; this is a loop of "
+            f"{fit.servo.kind}, model {model or 'not stated'}, with friction {fit.friction}, b = {p['b']:.3g}"
+        )
     found = {name: float(p[letter]) for name, letter in BAM.items() if np.isfinite(p[letter])}
     none = dict.fromkeys(("load_friction_motor_stribeck", "load_friction_external_stribeck"), 0.0)
     motor = {"kt": p["b"] / p["a"], "R": p["b"] / p["a"] ** 2, "error_gain_ratio": 1 + p["gain_error"], "alpha": 1.0}
     named = {"model": BAM_LAWS[fit.friction], "actuator": model.lower().replace("-", "")}
-    return json.dumps(named | motor | found | none, indent=1, allow_nan=False) + "\n"
-
-
-def device_of_bam(path: Path) -> dict[str, Any]:
-    """Device of a published JSON of BAM; ExperimentError if it is none."""
-    try:
-        given = json.loads(path.read_text(encoding="utf-8"))
-        a, law = given["kt"] / given["R"], {x: name for name, x in BAM_LAWS.items()}.get(given["model"], given["model"])
-        values = {"a": a, "b": given["kt"] * a} | {x: float(given[name]) for name, x in BAM.items() if name in given}
-        require_possible(values)
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, ZeroDivisionError) as error:
-        raise ExperimentError(f"{path} is no parameter file of BAM (kt, R, armature, model ...): {error}") from error
-    of = {x: {"value": v, "sigma": None, "spread": None, "unit": SERVO_PARAMETERS[x].unit} for x, v in values.items()}
-    model = next((name for name in PUBLISHED if name.lower().replace("-", "") == given.get("actuator")), None)
-    known = {"model": model, "supply": PUBLISHED[model].supply} if model else {}
-    return {"name": path.stem, "source": f"{path}, BAM {given['model']}", "known": known, "friction": law, "parameters": of}
+    lost = [x for x in fit.p if x not in ("a", "b", "gain_error", *BAM.values()) and fit.p[x]]
+    return json.dumps(named | motor | found | none, indent=1, allow_nan=False) + "\n", lost
 
 
 EXPRESSIBLE = ("a", "b", "Ia", "Fs", "Fv", "offset", "lag", "lead", "delay", "rate", "backlash")
@@ -90,6 +77,8 @@ def inexpressible(fits: Mapping[str, ServoFit]) -> list[str]:
     found = cannot_express((x for fit in fits.values() for x in fit.p if fit.p[x]), motor)
     if any("backlash" in fit.free for fit in fits.values()):
         found.append("backlash is written as a second joint; the loop of the dcmotor sees the rotor, before the play")
+    if any(run.forward is not None for fit in fits.values() for run in fit.loop.runs):
+        found.append("commanded velocities and torques have no place in the file: it is judged without them")
     words = ", ".join(f"{joint} {fit.offset:+.4g}" for joint, fit in fits.items())
     found.append(f"the file's angles are the log's plus an offset [rad]: {words}; add it to commands")
     if unknown := [joint for joint, fit in fits.items() if "offset" in fit.unscaled]:
@@ -153,18 +142,17 @@ def devices() -> dict[str, dict[str, Any]]:
 def device_of(name: str) -> dict[str, Any]:
     """A device; raise ExperimentError if none has this name."""
     every = devices()
-    if name.endswith(".json"):
-        return device_of_bam(Path(name))
     if name not in every:
         raise ExperimentError(f"there is no device {name!r}{did_you_mean(name, every)}; there are {', '.join(every)}")
     return every[name]
 
 
-def servo_toml_of(device: Mapping[str, Any]) -> str:
+def servo_toml_of(device: Mapping[str, Any], kp: float) -> str:
     """A servo.toml of a device, and the words that hold its parameters in a fit."""
     known = "\n".join(f"{key} = {json.dumps(x)}" for key, x in device["known"].items())
     held = " ".join(f"{letter}={of['value']:.4g}" for letter, of in device["parameters"].items() if letter in ("a", "b"))
-    return f"# {device['name']}: {device['source']}\n# a joint without a known load: --hold {held}\n{known}\nkp = 16  # yours\n"
+    above = f"# {device['name']}: {device['source']}\n# a joint without a known load: --hold {held}"
+    return f"{above}\n{known}\nkp = {kp:g}  # yours\n"
 
 
 def mjcf_of_device(device: Mapping[str, Any], robot: str, joints: Sequence[int], kp: float, folder: Path) -> str:

@@ -18,6 +18,7 @@ from idbench.identify.servo.mistakes import EXPLAINED, MISTAKES, REMAINING
 from idbench.identify.servo.parameters import SERVO_PARAMETERS
 from idbench.identify.tables import concise
 
+STILL = 0.02  # Share of the largest motion of a joint up to which a joint rests: the first line is not on it
 ALIKE = 1.5  # Error on held-out logs, over that on the fitted ones, up to which a model holds
 COUNTS = 0.1  # Counts below which residuals are said in rad: where a log is not rounded
 
@@ -132,7 +133,8 @@ def verdict_lines(
         lines.append((joint, f"{word}: {why}" if joint in held_out else why))
         word_of[lines[-1][1]] = word
         share = float(np.mean(held_out.get(joint, 0.0))) / max(moved.get(joint, 0.0), TINY)
-        worst.append((WORDS.index(word), share, f"Result: {word} ({joint}): {why}"))
+        if not moved or moved[joint] > STILL * max(moved.values()):
+            worst.append((WORDS.index(word), share, f"Result: {word} ({joint}): {why}"))
     first = max(worst)
     words = [(joint, mistake_words(mistake, fits[joint])) for joint, mistake in mistakes.items()]
     alike = [(joint, text) for joint, fit in fits.items() if (text := confounded(fit))]

@@ -85,9 +85,10 @@ class Bodies:
     (2020) 348-365): it depends on no frame, is half the square of relative changes where they are small, and infinite where no
     body is. Armatures and frictions, which are not negative, count as matrices of one row. For others, and the parameters of a
     link of which one is held, it is 1/2 ((x - x0) / size)^2. Given values and sizes are of the standard parameters, shape (p,).
+    Rotors that are not given are free, unless bodies are `sized`, of which nothing is known either.
     """
 
-    def __init__(self, parameters: Sequence[Parameter], given: Array, size: Array) -> None:
+    def __init__(self, parameters: Sequence[Parameter], given: Array, size: Array, sized: bool = False) -> None:
         place = {(p.symbol, p.joint): i for i, p in enumerate(parameters)}
         whole = [p.joint for p in parameters if p.kind == "mass" and all((x, p.joint) in place for x in INERTIAL)]
         links = sorted(joint for joint in whole if joint is not None)
@@ -105,7 +106,7 @@ class Bodies:
         for link, S in zip(self.links, inertias, strict=True):
             self.given[link] = inertial(S)
         self.given[self._signed] = np.maximum(given[self._signed], size[self._signed])
-        absent = [parameters[i].kind == "rotor inertia" and not given[i] for i in self._signed]
+        absent = [parameters[i].kind == "rotor inertia" and not (given[i] or sized) for i in self._signed]
         self._weight = np.where(absent, UNKNOWN, 1.0)
 
     def with_extent(self, x: Array) -> Array:

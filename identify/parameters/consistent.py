@@ -83,7 +83,8 @@ def consistent_parameters(
     IdentificationError
         If the covariance is not positive definite, or the given model has a link that cannot exist.
     """
-    root, given = _root(covariance), _sized(grouping, X, covariance, np.array(given, dtype=np.float64))
+    root, filed = _root(covariance), np.array(given, dtype=np.float64)
+    sized = (given := _sized(grouping, X, covariance, filed.copy())) is not filed and not np.array_equal(given, filed)
     rows, columns = _touched(grouping, X)
     standard, alone = given.copy(), np.flatnonzero(~columns)  # as estimated what no constraint touches, as given the others
     which = np.abs(grouping.K[:, alone]).argmax(axis=0)
@@ -92,7 +93,7 @@ def consistent_parameters(
         K = grouping.K[np.ix_(rows, columns)]
         own, sigma = _root(covariance[np.ix_(rows, rows)]), np.sqrt(np.diagonal(covariance))[rows]
         parameters = [p for p, there in zip(grouping.standard.parameters, columns, strict=True) if there]
-        bodies = Bodies(parameters, given[columns], np.maximum(np.abs(given[columns]), least_change(K, sigma)))
+        bodies = Bodies(parameters, given[columns], np.maximum(np.abs(given[columns]), least_change(K, sigma)), sized)
         rest = (X - grouping.base(np.where(columns, 0.0, standard)))[rows]
         A = np.asarray(np.linalg.solve(own, np.column_stack([K, rest])), dtype=np.float64)
         standard[columns] = bodies.with_extent(nearest(A[:, :-1], A[:, -1], bodies, weight))

@@ -117,7 +117,7 @@ class Servo:
         if not (np.isfinite(self.kd) and min(self.kp, self.time_constant) >= 0 and max(self.kp, self.time_constant) < np.inf):
             stated = f"kp = {self.kp:g}, time_constant = {self.time_constant:g}, kd = {self.kd:g}"
             raise SettingError(f"{stated}: all must be finite, and only kd may be negative")
-        if not self.kp and not self.kd:
+        if not self.kp and not self.kd > 0:
             raise SettingError("kp or kd must be above 0: a loop without gains does not respond to its command")
         if self.kind == "duty" and not self.limit <= 1:
             if self.limit != np.inf:

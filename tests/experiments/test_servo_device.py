@@ -73,30 +73,25 @@ def budget(bam, motor, external, speed):
 
 
 @pytest.mark.parametrize("law", LAWS)
-def test_a_file_of_bam_has_the_same_friction_and_comes_back(law, tmp_path, idbench, rng):
+def test_a_file_of_bam_has_the_same_friction(law, rng):
     servo = Servo(gain=0.166, kp=16.0, supply=12.0, limit=0.97, counts=4096)
     p = {"a": 0.57, "b": 1.18, "Ia": 0.022, "Fs": 0.12, "Fv": 0.02, "offset": 0.0, "delay": 0.02, "rate": 4.8, **LAWS[law]}
     fit = SimpleNamespace(friction=law, servo=servo, p=p)
-    (tmp_path / "axis.json").write_text(bam_of(fit, "STS3215"))
-    bam, space = json.loads((tmp_path / "axis.json").read_text()), {}
+    text, lost = bam_of(fit, "STS3215")
+    assert lost == []
+    bam, space = json.loads(text), {}
     assert bam["actuator"] == "sts3215"
     assert (bam["kt"] / bam["R"], bam["kt"] ** 2 / bam["R"]) == pytest.approx((0.57, 1.18))
     exec(servo_function("arm", {"axis": (servo, fit)}, ["a.csv"]), space)
     ours = space["Servo"]("axis", 0.001)
     for motor, external, speed in rng.normal(size=(50, 3)):
         assert ours.friction(speed, motor, external) == pytest.approx(budget(bam, motor, external, speed))
-    words = "--robot", "servo_arm", "--joints", "elbow", "--write", tmp_path / "arm.xml"
-    code, out, err = idbench("device", tmp_path / "axis.json", *words)
-    assert code == 0, err
-    assert f"friction law {law}" in out
-    model = mujoco.MjModel.from_xml_path(str(tmp_path / "arm.xml"))
-    assert model.joint("elbow").armature[0] == pytest.approx(0.022)
 
 
-def test_what_is_no_file_of_bam_is_refused(idbench, tmp_path):
-    (tmp_path / "no.json").write_text('{"kt": 1}')
-    code, _, err = idbench("device", tmp_path / "no.json")
-    assert code == 2
-    assert "is no parameter file of BAM" in err
-    with pytest.raises(ExperimentError, match="BAM has servos of a DC motor"):
-        bam_of(SimpleNamespace(friction="gear", servo=Servo(), p={}), "")
+def test_what_bam_has_no_place_for_is_said_or_refused():
+    p = {"a": 0.57, "b": 1.18, "Ia": 0.022, "Fs": 0.12, "Fv": 0.02, "offset": 0.0, "delay": 0.02, "lag": 0.03}
+    servo = Servo(gain=0.166, kp=16.0, supply=12.0, limit=0.97)
+    assert bam_of(SimpleNamespace(friction="coulomb", servo=servo, p=p), "MX-64")[1] == ["lag"]
+    for friction, loop, model in (("gear", servo, "MX-64"), ("coulomb", servo, ""), ("coulomb", Servo(kind="torque"), "MX-64")):
+        with pytest.raises(ExperimentError, match="BAM has DC motors, of a model"):
+            bam_of(SimpleNamespace(friction=friction, servo=loop, p=p), model)

@@ -287,6 +287,8 @@ def test_a_link_that_leaves_its_file_is_named_and_one_that_cannot_be_takes_nothi
     given = written.consistent.given.copy()
     given[written.consistent.names.index("M3")] /= 5
     written.__dict__["consistent"] = replace(written.consistent, given=given)
+    assert written.strayed == []  # a body whose size is assumed is none of the file's
+    written.fit.robot_model.__dict__["filed"] = given
     (line,) = written.strayed
     assert line.startswith("the link of joint3 has 4.8")
 

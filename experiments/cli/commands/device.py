@@ -37,7 +37,7 @@ def device(options: ShowDevice) -> None:
     page.found |= known
     _print(page, known)
     for path in options.write:
-        text, said = servo_toml_of(known), "what is known of it, for idbench servo --servo"
+        text, said = servo_toml_of(known, options.kp), "what is known of it, for idbench servo --servo"
         if path.suffix == ".xml":
             text = mjcf_of_device(known, robot, places, options.kp, path.absolute().parent)
             said = f"{options.name} at {', '.join(names[j] for j in places)}"

@@ -110,11 +110,12 @@ def _write_function(page: Page, options: IdentifyServo, path: Path, fit: ServosF
 
 
 def _write_bam(page: Page, options: IdentifyServo, path: Path, fit: ServosFit) -> None:
-    model = str(fit.servos.known.stated.get("model", "custom"))
-    for joint, own in fit.fits.items():
-        target = path if len(fit.fits) == 1 else path.with_name(f"{path.stem}_{joint}.json")
-        write_text(target, bam_of(own, model), "--write", force=options.force, read=files_of(options))
+    made = {joint: bam_of(own, str(fit.servos.known.stated.get("model", ""))) for joint, own in fit.fits.items()}
+    for joint, (text, lost) in made.items():
+        target = path if len(made) == 1 else path.with_name(f"{path.stem}_{joint.replace('/', '_')}.json")
+        write_text(target, text, "--write", force=options.force, read=files_of(options))
         page.print(Text(f"written to {target}: the servo of {joint} for BAM"), soft_wrap=True)
+        page.warn({"the written file": [f"BAM has no place for {', '.join(lost)} of {joint}"] if lost else []})
 
 
 WRITERS = {".xml": _write, ".py": _write_function, ".json": _write_bam}
