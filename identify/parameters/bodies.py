@@ -58,7 +58,7 @@ SMALL = 0.01
 """Share of the robot's mean mass below which a given body says nothing of the real one, and one of that share of the mean body
 takes its place: a file may have a flange of a milligram where a tool of a kilogram is."""
 
-UNKNOWN = 1e-6  # Weight of the logarithm that keeps rotors above zero that a file lacks: they take what is constant at a joint
+UNKNOWN = 1e-6  # Weight of what keeps rotors, springs and frictions that a file lacks finite: they take what bodies cannot
 
 LEAST = 1e-8  # Share of the trace of a link's pseudo-inertia that its least eigenvalue is raised to
 
@@ -85,7 +85,7 @@ class Bodies:
     (2020) 348-365): it depends on no frame, is half the square of relative changes where they are small, and infinite where no
     body is. Armatures and frictions, which are not negative, count as matrices of one row. For others, and the parameters of a
     link of which one is held, it is 1/2 ((x - x0) / size)^2. Given values and sizes are of the standard parameters, shape (p,).
-    Rotors that are not given are free, unless bodies are `sized`, of which nothing is known either.
+    What is not given is free, but for rotors where bodies are `sized`, of which nothing is known either.
     """
 
     def __init__(self, parameters: Sequence[Parameter], given: Array, size: Array, sized: bool = False) -> None:
@@ -102,11 +102,11 @@ class Bodies:
         inertias = [_at_least(S, SMALL * mean) if S[3, 3] < SMALL * mean[3, 3] else S for S in thick]
         self._inverses = np.linalg.inv(np.reshape(inertias, (-1, 4, 4)))
         self._places = np.reshape(np.array(self.links, dtype=np.intp), (-1, len(INERTIAL)))
-        self.given, self._size = given.copy(), size
+        self.given, self._size = given.copy(), np.where(given == 0, size / np.sqrt(UNKNOWN), size)
         for link, S in zip(self.links, inertias, strict=True):
             self.given[link] = inertial(S)
         self.given[self._signed] = np.maximum(given[self._signed], size[self._signed])
-        absent = [parameters[i].kind == "rotor inertia" and not (given[i] or sized) for i in self._signed]
+        absent = [not (given[i] or (sized and parameters[i].kind == "rotor inertia")) for i in self._signed]
         self._weight = np.where(absent, UNKNOWN, 1.0)
 
     def with_extent(self, x: Array) -> Array:
