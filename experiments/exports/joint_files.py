@@ -18,10 +18,7 @@ from idbench.sim.robot.tree import standard_parameters
 FIELDS = {"armature": "Ia", "frictionloss": "Fs", "damping": "Fv"}  # What MuJoCo calls what a joint has, and its letters
 NORMAL = 1.96  # Standard errors of half a 95 % interval
 
-SYSID = Template('''"""Parameters of $about, for mujoco.sysid.
-
-They begin at what was identified, bounds are 95 % intervals; what the log does not show by itself is frozen. For the MJCF of
-the same identification:
+SYSID = Template('''"""Parameters of $about, for mujoco.sysid: bounds are 95 % intervals, shares of sums are frozen.
 
     model = sysid.apply_param_modifiers(parameters(), mujoco.MjSpec.from_file("arm.xml"))
 """

@@ -169,11 +169,13 @@ class Problem:
             return np.ones(len(self.some_rows.time))
         return np.concatenate([part.weights for part in self.parts], axis=-1)
 
-    @cached_property
+    @property
     def explicit(self) -> "Problem":
         """The problem of the explicit model, whose rows show the noise of the logs."""
-        if isinstance(self.model, ExplicitModel):
-            return self
+        return self if isinstance(self.model, ExplicitModel) else self._of_explicit
+
+    @cached_property
+    def _of_explicit(self) -> "Problem":
         return self._explicit or replace(self, model=ExplicitModel(), _signals=self.signals)
 
     @cached_property

@@ -275,7 +275,7 @@ def test_the_written_friction_of_a_servo_is_that_of_c(rng):
     p = ServoLaw(*rng.uniform(0.1, 1.0, len(ServoLaw._fields)))
     text = files("idbench.experiments.exports").joinpath("servo.py.txt").read_text(encoding="utf-8")
     written = {}
-    exec(text.replace("{servos}", repr({"hip": {k: float(x) for k, x in p._asdict().items()}})), written)
+    exec(text.replace("$servos", repr({"hip": {k: float(x) for k, x in p._asdict().items()}})), written)
     servo = written["Servo"]("hip", 1e-3)
     for speed, motor, external, sent in rng.uniform(-2, 2, (20, 4)).tolist():
         assert servo.friction(speed, motor, external, sent) == pytest.approx(
