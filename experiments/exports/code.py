@@ -12,6 +12,8 @@ from string import Template
 from idbench.experiments.exports.functions import Function, RobotFunctions
 from idbench.identify.basis.tape import Step, Symbol, Tape
 
+TRAINING = ("_mjlab.py", "_isaaclab.py", "_playground.py")  # Endings of code beside ranges, for training frameworks
+BAND = "_band.svg"  # Ending of the picture of free runs beside them
 LONG = 100  # Characters of an expression that is not written into another one: a line stays readable
 
 C_WORDS = (

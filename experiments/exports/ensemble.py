@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from idbench.experiments.exports.joint_files import NORMAL
 from idbench.experiments.identification.consistent_estimate import drawn_about
 from idbench.experiments.identification.fit import Fit
 from idbench.experiments.judgement.held_out import HeldOut, on_log
@@ -30,8 +31,7 @@ LENGTH = 0.5
 
 STRETCHES = 20  # Runs over a log at most: 40 in their place change the share that is held by 0.3 % (a simulated arm)
 
-LEVEL, NORMAL = 0.95, 1.96
-"""Share of instants that the band shall hold, and that of a normal distribution, in its sigma, from its middle."""
+LEVEL = 0.95  # Share of instants that the band shall hold
 
 SETTLED = 2  # Samples at the beginning of a run that do not count: there the position is that of the log
 MOST = 4_000_000  # Values of torques that are drawn at once: 30 MB

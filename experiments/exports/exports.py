@@ -12,9 +12,9 @@ import numpy as np
 
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.exports.c_code import c_texts
-from idbench.experiments.exports.code import Content
+from idbench.experiments.exports.code import BAND, TRAINING, Content
 from idbench.experiments.exports.functions import require_formulas
-from idbench.experiments.exports.joint_files import actuators_text, cogging_map, sysid_text
+from idbench.experiments.exports.joint_files import actuators_text, cogging_map, require_cogging, sysid_text
 from idbench.experiments.exports.python_code import python_text
 from idbench.experiments.identification.consistent_robot import WrittenRobot
 from idbench.experiments.identification.fit import Fit
@@ -106,10 +106,14 @@ def _turned(written: WrittenRobot) -> list[str]:
     return [] if gravity == EARTH else [f"gravity {gravity} has no place in the file: set it in the simulation"]
 
 
-def actuators(fit: Fit, model: str, path: Path) -> Exported:
-    """What a training framework asks of each joint's actuator, as YAML, with standard errors."""
-    written = WrittenRobot(fit, model)
-    return Exported({path: actuators_text(written)}, written.warnings)
+def of_joints(text: Callable[[WrittenRobot], str]) -> Callable[[Fit, str, Path], Exported]:
+    """Return what writes a text of the joints of the robot."""
+
+    def render(fit: Fit, model: str, path: Path) -> Exported:
+        written = WrittenRobot(fit, model)
+        return Exported({path: text(written)}, written.warnings)
+
+    return render
 
 
 FOLDER = ".ensemble"  # Ending of the name of a folder with robots
@@ -235,12 +239,6 @@ def drawn(fit: Fit, model: str, path: Path) -> Exported:
     return Exported(ranges.texts(robots, path), [*written.warnings, *lost], notes(robots))
 
 
-def sysid_parameters(fit: Fit, model: str, path: Path) -> Exported:
-    """Return parameters for mujoco.sysid, which begins at the estimate and searches within its 95 % intervals."""
-    written = WrittenRobot(fit, model)
-    return Exported({path: sysid_text(written, f"{fit.robot_model.tree.name}, {origin(fit, model)}")}, written.warnings)
-
-
 def _content(fit: Fit, model: str, path: Path) -> Content:
     estimate = fit.estimates[model]
     functions = require_formulas(estimate.problem.basis, fit.robot_model.tree, path)
@@ -258,20 +256,17 @@ def require_written_back(robot_model: RobotModel, path: Path) -> None:
     rewritten(robot_model.name, {}, path.absolute().parent, robot_model.mounting)
 
 
-CODE = ("_mjlab.py", "_isaaclab.py", "_playground.py", "_band.svg")
-"""Endings of the code beside ranges, and of the picture of free runs."""
-
 EXPORTS: dict[str, FileKind] = {
     ".xml": FileKind("the robot", mjcf, require_written_back),
     ".urdf": FileKind("the robot", urdf, require_written_back),
     ".sdf": FileKind("the robot", sdf, require_written_back),
-    ".yaml": FileKind("values of the joints' actuators", actuators, require_written_back),
+    ".yaml": FileKind("values of the joints' actuators", of_joints(actuators_text), require_written_back),
     ".json": FileKind("base parameters and regressor", base_parameters, lambda *_: None),
-    "sysid.py": FileKind("parameters for mujoco.sysid", sysid_parameters, require_written_back),
-    "cogmap.csv": FileKind("the joints' cogging", lambda *of: Exported({of[2]: cogging_map(*of)}), lambda *_: None),
+    "sysid.py": FileKind("parameters for mujoco.sysid", of_joints(sysid_text), require_written_back),
+    "cogmap.csv": FileKind("the joints' cogging", lambda *of: Exported({of[2]: cogging_map(*of)}), require_cogging),
     ".py": FileKind("dynamics and regressors in Python", python_module, require_functions),
     ".c": FileKind("dynamics and regressors in C, with their header,", c_source, require_functions, (".h",)),
-    ".toml": FileKind("robots drawn from what is not known, with code for training,", drawn, require_written_back, CODE),
+    ".toml": FileKind("robots drawn from what is not known, with code,", drawn, require_written_back, (*TRAINING, BAND)),
     FOLDER: FileKind("robots drawn from what is not known", drawn, require_written_back),
 }
 """What is written, by the ending of its name."""

@@ -1,7 +1,6 @@
 """Files of what joints have: values for actuators, parameters for mujoco.sysid, and a map of their cogging."""
 
 import json
-import re
 from importlib.metadata import version
 from pathlib import Path
 from pprint import pformat
@@ -12,10 +11,15 @@ import numpy as np
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.consistent_robot import WrittenRobot
 from idbench.experiments.identification.fit import Fit
-from idbench.identify.basis.block import named
+from idbench.experiments.identification.robot_model import RobotModel
+from idbench.identify import Basis, State
+from idbench.identify.basis import Cogging
+from idbench.identify.basis.block import AbstractBlock, named
+from idbench.identify.basis.of_joints import block_of_all_joints
+from idbench.sim.robot.rewrite import DRIVE
 from idbench.sim.robot.tree import standard_parameters
 
-FIELDS = {"armature": "Ia", "frictionloss": "Fs", "damping": "Fv"}  # What MuJoCo calls what a joint has, and its letters
+FIELDS = {what: letters for letters, what in DRIVE.items() if letters != "K"}  # What MuJoCo calls what a drive has, its letters
 NORMAL = 1.96  # Standard errors of half a 95 % interval
 
 SYSID = Template('''"""Parameters of $about, for mujoco.sysid: bounds are 95 % intervals, shares of sums are frozen.
@@ -48,12 +52,17 @@ def parameters():
 """Code of a file of parameters."""
 
 
+def _about(written: WrittenRobot) -> str:
+    fit = written.fit
+    return f"{fit.robot_model.tree.name}: {', '.join(fit.logs.names)}, {written.model} model, idbench {version('idbench')}"
+
+
 def actuators_text(written: WrittenRobot) -> str:
     """What a training framework asks of each joint's actuator, as YAML, with standard errors."""
-    fit, robot = written.fit, written.fit.robot_model.robot
+    robot = written.fit.robot_model.robot
     most, known = robot.most("velocity"), standard_parameters(robot)
     lines = [
-        f"# {fit.robot_model.tree.name}: {', '.join(fit.logs.names)}, {written.model} model, idbench {version('idbench')}.",
+        f"# {_about(written)}.",
         "# armature [kg m^2], frictionloss [N m], damping [N m s/rad]; of slides kg, N, N s/m. null: not known.",
         "# from: log; sum: a share of what the log shows, as near to the robot's file as that allows; stated; file.",
         "joints:",
@@ -76,7 +85,7 @@ def _or_null(x: float | None) -> str:
     return text.replace("e", ".0e") if "e" in text and "." not in text else text  # or a reader of YAML 1.1 takes it for text
 
 
-def sysid_text(written: WrittenRobot, about: str) -> str:
+def sysid_text(written: WrittenRobot) -> str:
     """Python file of parameters for mujoco.sysid, with their 95 % intervals."""
     joints = dict[str, dict[str, tuple[float, float, float]]]()
     for j, joint in enumerate(written.fit.robot_model.robot.joints):
@@ -84,26 +93,35 @@ def sysid_text(written: WrittenRobot, about: str) -> str:
             x, sigma = float(written.values.get(name := named(letters, j), 0.0)), written.sigma.get(name, 0.0)
             off = NORMAL * sigma if np.isfinite(sigma) else 0.0
             joints.setdefault(joint, {})[key] = x, max(x - off, 0.0), x + off
-    return SYSID.substitute(about=about.replace("\\", "/").replace('"', "'"), joints=pformat(joints))
+    return SYSID.substitute(about=_about(written).replace("\\", "/").replace('"', "'"), joints=pformat(joints))
 
 
-WAVE = re.compile(r"C([\d.]+)([sc])")  # Letters of the amplitude of a wave: waves a turn, sine or cosine
 POINTS = 3600  # In a turn: 40 in each of the 90 waves that are looked for at most
 
 
-def cogging_map(fit: Fit, model: str, path: Path) -> str:
-    """Table of joint, position [rad], torque and its standard error [N m]: tau(q) = sum C_ks sin(k q) + C_kc cos(k q)."""
-    estimate = fit.estimates[model]
-    places = estimate.problem.basis.places.items()
-    waves = [
-        (p.joint, k, float(of[1]), np.sin if of[2] == "s" else np.cos) for p, k in places if (of := WAVE.fullmatch(p.symbol))
-    ]
-    if not waves:
+def waves_of(basis: Basis) -> list[AbstractBlock]:
+    """Blocks of cogging."""
+    return [block for block in basis.blocks if isinstance(block_of_all_joints(block), Cogging)]
+
+
+def require_cogging(robot_model: RobotModel, path: Path) -> None:
+    """Raise ExperimentError if no joint has cogging; where the log chooses the laws, that is known after the fit."""
+    if not robot_model.laws.auto and not waves_of(robot_model.basis):
         raise ExperimentError(f"{path}: no joint has cogging: add it, as in --friction standard+cogging:12, or --friction auto")
-    q, lines = np.linspace(0, 2 * np.pi, POINTS, endpoint=False), ["joint,position,torque,sigma"]
-    for j, joint in enumerate(fit.robot_model.robot.joints):
-        if own := [wave for wave in waves if wave[0] == j]:
-            W, at = np.stack([wave(count * q) for _, _, count, wave in own], axis=1), [k for _, k, _, _ in own]
+
+
+def cogging_map(fit: Fit, model: str, path: Path) -> str:
+    """Table of joint, position [rad], torque and its standard error [N m] over a turn."""
+    estimate, joints = fit.estimates[model], fit.robot_model.robot.joints
+    q = np.linspace(0, 2 * np.pi, POINTS, endpoint=False)
+    still = State(np.tile(q, (len(joints), 1)), np.zeros((len(joints), POINTS)), np.zeros_like)
+    columns = [x for block in waves_of(estimate.problem.basis) for x in block.explicit(still).items()]
+    places, lines = estimate.problem.basis.places, ["joint,position,torque,sigma"]
+    for j, joint in enumerate(joints):
+        if own := {places[p]: column for (row, p), column in columns if row == j and p in places}:
+            W, at = np.stack(list(own.values()), axis=1), list(own)
             sigma = np.sqrt(np.einsum("qi,ij,qj->q", W, estimate.covariance[np.ix_(at, at)], W))
             lines += [f"{joint},{x:.6g},{tau:.6g},{s:.3g}" for x, tau, s in zip(q, W @ estimate.X[at], sigma, strict=True)]
+    if len(lines) == 1:
+        raise ExperimentError(f"{path}: no cogging was found")
     return "\n".join(lines) + "\n"

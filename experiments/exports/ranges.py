@@ -9,37 +9,34 @@ import numpy as np
 import tomli_w
 
 from idbench.experiments.errors import ExperimentError
-from idbench.experiments.exports.code import template
-from idbench.experiments.exports.ensemble import DRAWS, LENGTH, NORMAL, Ensemble, FreeRuns, fields_of
+from idbench.experiments.exports.code import BAND, TRAINING, template
+from idbench.experiments.exports.ensemble import DRAWS, LENGTH, Ensemble, FreeRuns, fields_of
+from idbench.experiments.exports.joint_files import FIELDS, NORMAL
 from idbench.experiments.identification.consistent_robot import WrittenRobot
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.reports.panels import Panel, stacked
 from idbench.identify.basis.block import named
+from idbench.sim.robot.varied import DRIVE
 
-CODE = ("_mjlab.py", "_isaaclab.py", "_playground.py")  # Endings of the names of code for training frameworks
-PICTURE = "_band.svg"  # Ending of the name of the picture of the band
 DIGITS = 9  # Significant digits: two more than the single precision of training frameworks
 
-JOINT = {"armature": ("Ia", "dof_armature"), "damping": ("Fv", "dof_damping"), "frictionloss": ("Fs", "dof_frictionloss")}
-"""What a joint has -> letters of the parameter, and MuJoCo's field."""
+JOINT = {what: (letters, DRIVE[letters]) for what, letters in FIELDS.items()}  # What a joint has, letters, MuJoCo's field
 
 BODY = {"mass": "body_mass", "com": "body_ipos", "inertia": "body_inertia", "quat": "body_iquat"}
 """What a body has -> MuJoCo's field."""
 
-ALONE = 0.8
-"""Share of the variance of a parameter that the others leave, from which on it has a range of its own: what is drawn one by one
-then errs by an eighth more than sigma says at most."""
+ALONE = 0.8  # Share of its variance that others leave a value with a range: drawn one by one, values err 12 % too much
 
 
 def texts(ensemble: Ensemble, path: Path) -> dict[Path, str]:
     """Return the texts of the robots and ranges, and of the code that takes them, by their paths."""
     about = f"{ensemble.fit.robot_model.tree.name}, identified by idbench {version('idbench')}"
     made = {path: tomli_w.dumps(table_of(ensemble)) + _robots(ensemble)}
-    for ending in CODE:
+    for ending in TRAINING:
         text = template(f"ranges{ending}").substitute(about=about, draws=DRAWS, file=path.name)
         made[path.with_name(path.stem + ending)] = text
     if ensemble.bands:
-        made[path.with_name(path.stem + PICTURE)] = picture(ensemble.bands[0], ensemble.fit.robot_model)
+        made[path.with_name(path.stem + BAND)] = picture(ensemble.bands[0], ensemble.fit.robot_model)
     return made
 
 
@@ -72,11 +69,9 @@ def table_of(ensemble: Ensemble) -> dict[str, Any]:
         joints[joint]["disturbance"] = {"rms": _short(sizes[j]), "correlation_time": _short(times[j])}
     return {
         "about": (
-            f"[[robots]]: {DRAWS} physically consistent robots (seed {ensemble.seed}): armature, damping, frictionloss of "
-            "[joints]; mass, com, principal inertia and its quat (w x y z) of [bodies]. Take one of them, whole. Units: "
-            "kg, m, kg m^2, N m, N m s/rad (slides: N, N s/m). from: log, with sigma, and a range of 95 % where others do "
-            "not depend on it; sum: a share of what the log shows, as near to the robot's file as that allows; stated; "
-            "file. disturbance: torque that the model does not explain [N m] and the time over which it is alike [s]."
+            f"[[robots]]: {DRAWS} physically consistent robots (seed {ensemble.seed}), to be taken whole: values of [joints] "
+            "and [bodies] in their order; quat (w x y z) of the principal inertia. Units: kg, m, kg m^2, N m, N m s/rad (of "
+            "slides N, N s/m). disturbance: torque that the model does not explain [N m], the time over which it is alike [s]."
         ),
         "spread": _short(ensemble.spread),
         "free_run": LENGTH,
@@ -89,7 +84,10 @@ def table_of(ensemble: Ensemble) -> dict[str, Any]:
             for band in ensemble.bands
         ],
         "joints": joints,
-        "bodies": {name: {"mass": _value(ensemble, written, mass.get(k, ""))} for name, k in bodies_of(ensemble).items()},
+        "bodies": {
+            name: {"mass": _value(ensemble, written, mass[k]) if k in mass else {"value": 0.0, "from": "sum"}}
+            for name, k in bodies_of(ensemble).items()
+        },
     }
 
 
@@ -108,11 +106,10 @@ def _value(ensemble: Ensemble, written: WrittenRobot, name: str) -> dict[str, An
     found: dict[str, Any] = {"value": _short(value), "from": written.source(name)}
     if name not in written.sigma:
         return found
-    problem, sigma = ensemble.estimate.problem, ensemble.spread * written.sigma[name]
-    place = next(k for p, k in problem.basis.places.items() if p.name == name)
-    C = ensemble.estimate.covariance
+    C, sigma = ensemble.estimate.covariance, ensemble.spread * written.sigma[name]
+    place = next(k for p, k in ensemble.estimate.problem.basis.places.items() if p.name == name)
     found["sigma"] = _short(sigma)
-    if 1 / (C[place, place] * np.linalg.inv(C)[place, place]) >= ALONE:
+    if 1 / (C[place, place] * np.linalg.pinv(C, hermitian=True)[place, place]) >= ALONE:
         found |= {"low": _short(max(value - NORMAL * sigma, 0.0)), "high": _short(value + NORMAL * sigma)}
     return found
 
@@ -123,13 +120,9 @@ def _robots(ensemble: Ensemble) -> str:
     fields = fields_of(robot, ensemble.standard)
     columns = {what: fields[field][:, : robot.n] for what, (_, field) in JOINT.items()}
     columns |= {what: fields[field][:, bodies] for what, field in BODY.items()}
-    rounded = {what: [json.dumps(_rounded(own)) for own in values] for what, values in columns.items()}
-    each = ("\n".join(f"{what} = {own[k]}" for what, own in rounded.items()) for k in range(DRAWS))
+    rounded = {what: json.loads(json.dumps(values.tolist()), parse_float=_short) for what, values in columns.items()}
+    each = ("\n".join(f"{what} = {json.dumps(own[k])}" for what, own in rounded.items()) for k in range(DRAWS))
     return "".join(f"\n[[robots]]\n{lines}\n" for lines in each)
-
-
-def _rounded(values: Any) -> Any:
-    return [_rounded(x) for x in values] if np.ndim(values) else _short(values)
 
 
 def _short(x: Any) -> float:

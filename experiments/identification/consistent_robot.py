@@ -47,9 +47,12 @@ class WrittenRobot:
 
     def source(self, name: str) -> str:
         """Whether a value is of the log, a share of a sum that the log shows, stated, or of the file."""
-        if name in self.sigma or name not in self.consistent.names:
-            return "log" if name in self.sigma else "stated" if name in self.values else "file"
-        return "sum" if self.fit.robot_model.grouping.K[:, self.consistent.names.index(name)].any() else "file"
+        names, K = self.consistent.names, self.fit.robot_model.grouping.K
+        if name in self.sigma:
+            return "log"
+        if name in names:
+            return "sum" if K[:, names.index(name)].any() else "file"
+        return "stated" if name in self.values else "file"
 
     @property
     def strayed(self) -> list[str]:

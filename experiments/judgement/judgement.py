@@ -75,7 +75,7 @@ class Judgement:
         if (worst := max(_worst(one) for one in self.held_out)) > percent:
             return f"torque errors of {error_percentage(worst)} on a held-out log"
         hidden, joint = _hidden(self.fit)
-        return f"the log would not show a torque constant of {joint} that is 10 % off" if not hidden <= WEAK else ""
+        return "" if hidden <= WEAK else f"the log would not show a torque constant of {joint} that is {100 * WEAK:g} % off"
 
     def summary(self) -> dict[str, Any]:
         """Its part of summary.json, beside the fit's own."""

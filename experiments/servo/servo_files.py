@@ -37,7 +37,7 @@ def servo_function(robot: str, fits: Mapping[str, tuple[Servo, ServoFit]], logs:
 BAM = {
     "armature": "Ia", "friction_base": "Fs", "friction_viscous": "Fv", "friction_stribeck": "Fst", "dtheta_stribeck": "vs",
     "load_friction_base": "Fl", "load_friction_stribeck": "Fls", "load_friction_motor": "Flm", "load_friction_external": "Fle",
-    "command_delay": "delay", "max_velocity": "rate", "q_offset": "offset",
+    "command_delay": "delay", "max_velocity": "rate",
 }  # fmt: skip
 """Parameters of BAM (arXiv 2410.08650) -> letters; kt = b / a and R = b / a^2 are behind the gear there, too."""
 
@@ -56,7 +56,7 @@ def bam_of(fit: ServoFit, model: str) -> tuple[str, list[str]]:
     none = dict.fromkeys(("load_friction_motor_stribeck", "load_friction_external_stribeck"), 0.0)
     motor = {"kt": p["b"] / p["a"], "R": p["b"] / p["a"] ** 2, "error_gain_ratio": 1 + p["gain_error"], "alpha": 1.0}
     named = {"model": BAM_LAWS[fit.friction], "actuator": model.lower().replace("-", "")}
-    lost = [x for x in fit.p if x not in ("a", "b", "gain_error", *BAM.values()) and fit.p[x]]
+    lost = [x for x in fit.p if x not in ("a", "b", "gain_error", "offset", *BAM.values()) and fit.p[x]]
     return json.dumps(named | motor | found | none, indent=1, allow_nan=False) + "\n", lost
 
 
@@ -84,12 +84,6 @@ def inexpressible(fits: Mapping[str, ServoFit]) -> list[str]:
     if unknown := [joint for joint, fit in fits.items() if "offset" in fit.unscaled]:
         found.append(f"{', '.join(unknown)}: torques have no scale, so the offset is not known, and taken as 0")
     return found
-
-
-def without_servo(joints: Sequence[str], fits: Mapping[str, ServoFit]) -> list[str]:
-    """Joints of a written file without a servo."""
-    lost = ", ".join(joint for joint in joints if joint not in fits)
-    return [f"{lost}: no servo is written; what the robot's file has there stays"] if lost else []
 
 
 def values_of(parameters: Mapping[str, float], servo: Servo) -> ServoValues:

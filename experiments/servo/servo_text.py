@@ -18,7 +18,7 @@ from idbench.identify.servo.mistakes import EXPLAINED, MISTAKES, REMAINING
 from idbench.identify.servo.parameters import SERVO_PARAMETERS
 from idbench.identify.tables import concise
 
-STILL = 0.02  # Share of the largest motion of a joint up to which a joint rests: the first line is not on it
+STILL = 0.01  # Rms of a held-out motion, over the range of the fitted one, up to which a joint rests: a sine has 0.35
 ALIKE = 1.5  # Error on held-out logs, over that on the fitted ones, up to which a model holds
 COUNTS = 0.1  # Counts below which residuals are said in rad: where a log is not rounded
 
@@ -127,21 +127,21 @@ def verdict_lines(
     All by joint: mean errors of positions in the fitted and in the held-out logs [rad], shape (log,), rms of the motion of the
     held-out logs about its mean [rad], and what was proved to be wrong.
     """
-    lines, word_of, worst = list[tuple[str, str]](), dict[str, str](), list[tuple[int, float, str]]()
+    lines, word_of, worst = list[tuple[str, str]](), dict[str, str](), list[tuple[bool, int, float, str]]()
     for joint, fit in fits.items():
         word, why = _holds(fit, fitted[joint], held_out.get(joint), moved.get(joint, 0.0), joint in mistakes)
         lines.append((joint, f"{word}: {why}" if joint in held_out else why))
         word_of[lines[-1][1]] = word
         share = float(np.mean(held_out.get(joint, 0.0))) / max(moved.get(joint, 0.0), TINY)
-        if not moved or moved[joint] > STILL * max(moved.values()):
-            worst.append((WORDS.index(word), share, f"Result: {word} ({joint}): {why}"))
-    first = max(worst)
+        moves = moved.get(joint, np.inf) > STILL * fit.excitation.range
+        worst.append((moves, WORDS.index(word), share, f"Result: {word} ({joint}): {why}"))
+    _, first, _, line = max(worst)
     words = [(joint, mistake_words(mistake, fits[joint])) for joint, mistake in mistakes.items()]
     alike = [(joint, text) for joint, fit in fits.items() if (text := confounded(fit))]
     lacks = [(joint, _lacks(fit)) for joint, fit in fits.items()]
     rest = [("unsure", line) for some in (words, alike, lacks) for line in of_each(some).values()]
     each = [(word_of[why], line) for why, line in of_each(lines).items()] if len(lines) > 1 else []
-    return [(WORDS[first[0]], first[2]), *each, *rest]
+    return [(WORDS[first], line), *each, *rest]
 
 
 def mistake_words(mistake: Suspect, fit: ServoFit) -> str:

@@ -58,7 +58,7 @@ SMALL = 0.01
 """Share of the robot's mean mass below which a given body says nothing of the real one, and one of that share of the mean body
 takes its place: a file may have a flange of a milligram where a tool of a kilogram is."""
 
-UNKNOWN = 1e-6  # Weight of what keeps rotors, springs and frictions that a file lacks finite: they take what bodies cannot
+UNKNOWN = 1e-6  # Weight of what the given model lacks: a rotor without evidence has its root, .001, of the link's inertia
 
 LEAST = 1e-8  # Share of the trace of a link's pseudo-inertia that its least eigenvalue is raised to
 
@@ -85,10 +85,10 @@ class Bodies:
     (2020) 348-365): it depends on no frame, is half the square of relative changes where they are small, and infinite where no
     body is. Armatures and frictions, which are not negative, count as matrices of one row. For others, and the parameters of a
     link of which one is held, it is 1/2 ((x - x0) / size)^2. Given values and sizes are of the standard parameters, shape (p,).
-    What is not given is free, but for rotors where bodies are `sized`, of which nothing is known either.
+    Those that are `absent` from the given model are free but for `UNKNOWN`: they take what bodies near the given ones cannot.
     """
 
-    def __init__(self, parameters: Sequence[Parameter], given: Array, size: Array, sized: bool = False) -> None:
+    def __init__(self, parameters: Sequence[Parameter], given: Array, size: Array, absent: Array | None = None) -> None:
         place = {(p.symbol, p.joint): i for i, p in enumerate(parameters)}
         whole = [p.joint for p in parameters if p.kind == "mass" and all((x, p.joint) in place for x in INERTIAL)]
         links = sorted(joint for joint in whole if joint is not None)
@@ -102,12 +102,11 @@ class Bodies:
         inertias = [_at_least(S, SMALL * mean) if S[3, 3] < SMALL * mean[3, 3] else S for S in thick]
         self._inverses = np.linalg.inv(np.reshape(inertias, (-1, 4, 4)))
         self._places = np.reshape(np.array(self.links, dtype=np.intp), (-1, len(INERTIAL)))
-        self.given, self._size = given.copy(), np.where(given == 0, size / np.sqrt(UNKNOWN), size)
+        weight = np.ones(len(given)) if absent is None else np.where(absent, UNKNOWN, 1.0)
+        self.given, self._size, self._weight = given.copy(), size / np.sqrt(weight), weight[self._signed]
         for link, S in zip(self.links, inertias, strict=True):
             self.given[link] = inertial(S)
         self.given[self._signed] = np.maximum(given[self._signed], size[self._signed])
-        absent = [not (given[i] or (sized and parameters[i].kind == "rotor inertia")) for i in self._signed]
-        self._weight = np.where(absent, UNKNOWN, 1.0)
 
     def with_extent(self, x: Array) -> Array:
         """Return parameters of links with some extent in every direction, as simulators ask: `LEAST` of the trace."""
@@ -143,7 +142,7 @@ class Bodies:
         ratio, free = x[self._signed] / self.given[self._signed], (x - self.given)[self._free] / self._size[self._free]
         if (ratio <= 0).any():
             return None
-        there, weight = self._weight == 1.0, self._weight
+        there, weight = self._weight > UNKNOWN, self._weight
         value += float(np.sum(weight * (there * (ratio - 1) - np.log(ratio))) + np.sum(free**2) / 2)
         gradient[self._signed] = weight * (there - 1 / ratio) / self.given[self._signed]
         root[self._signed, self._signed] = x[self._signed] / np.sqrt(weight)

@@ -84,7 +84,10 @@ def consistent_parameters(
         If the covariance is not positive definite, or the given model has a link that cannot exist.
     """
     root, filed = _root(covariance), np.array(given, dtype=np.float64)
-    sized = (given := _sized(grouping, X, covariance, filed.copy())) is not filed and not np.array_equal(given, filed)
+    given = _sized(grouping, X, covariance, filed)
+    # Where bodies were given a size, rotors are no better known than these.
+    rotors = np.array([parameter.kind == "rotor inertia" for parameter in grouping.standard.parameters])
+    absent = (given == 0) & (np.array_equal(given, filed) | ~rotors)
     rows, columns = _touched(grouping, X)
     standard, alone = given.copy(), np.flatnonzero(~columns)  # as estimated what no constraint touches, as given the others
     which = np.abs(grouping.K[:, alone]).argmax(axis=0)
@@ -93,7 +96,7 @@ def consistent_parameters(
         K = grouping.K[np.ix_(rows, columns)]
         own, sigma = _root(covariance[np.ix_(rows, rows)]), np.sqrt(np.diagonal(covariance))[rows]
         parameters = [p for p, there in zip(grouping.standard.parameters, columns, strict=True) if there]
-        bodies = Bodies(parameters, given[columns], np.maximum(np.abs(given[columns]), least_change(K, sigma)), sized)
+        bodies = Bodies(parameters, given[columns], np.maximum(np.abs(given[columns]), least_change(K, sigma)), absent[columns])
         rest = (X - grouping.base(np.where(columns, 0.0, standard)))[rows]
         A = np.asarray(np.linalg.solve(own, np.column_stack([K, rest])), dtype=np.float64)
         standard[columns] = bodies.with_extent(nearest(A[:, :-1], A[:, -1], bodies, weight))
@@ -121,7 +124,7 @@ def _sized(grouping: BaseParameters, X: Array, covariance: Array, given: Array) 
     # A large rotor that is grouped with bodies says nothing of their size, and neither does one small body among others.
     alone = (bodies != 0) & (grouping.K[:, ~inertial] == 0).all(axis=1)
     ratios = [_ratio(X[rows] / sigma[rows], bodies[rows] / sigma[rows]) for rows in (alone, bodies != 0)]
-    return np.where(inertial, given * ratios[0], given) if min(ratios) > LARGER else given
+    return np.where(inertial, given * ratios[0], given) if min(ratios) > LARGER else given.copy()
 
 
 def _ratio(some: Array, others: Array) -> float:

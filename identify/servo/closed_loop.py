@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from idbench.identify.arrays import Array
+from idbench.identify.arrays import TINY, Array
 from idbench.identify.compiled import function, pointer
 from idbench.identify.servo.parameters import SERVO_PARAMETERS, ServoLaw
 from idbench.identify.servo.run import ServoRun
@@ -161,5 +161,5 @@ def initial_state(run: ServoRun) -> Begin:
         t, q = run.t[:3] - run.t[0], run.clean[:3]
         at, per_speed = float(q[0]), 2 / run.T
         speed = float(np.polyfit(t, q, 2)[1])
-    away = abs(float(run.command[0]) - at) / run.still
+    away = abs(float(run.command[0]) - at) / max(run.still, TINY)
     return Begin(np.array([at, speed, 0.0]), np.array([1.0, per_speed, 1.0 + away]))

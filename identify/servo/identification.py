@@ -121,7 +121,8 @@ def with_friction(fit: ServoFit, friction: str) -> ServoFit:
     loads = [np.abs(run.load.torque(run.t, run.clean)).mean() for run in fit.loop.runs]
     per_load = sum(fit.p.get(name, 0.0) for name in ("Fl", "Fle", "Fgd"))
     p = {name: x for name, x in fit.p.items() if name in kept} | {"Fs": fit.p["Fs"] + per_load * float(np.mean(loads))}
-    free = tuple(name for name in ("Fs", "Fv") if name in fit.free)
+    if not (free := tuple(name for name in ("Fs", "Fv") if name in fit.free)):
+        return replace(fit, friction=friction, free=(), found=replace(fit.found, p=p))
     held = {name: x for name, x in p.items() if name not in free}
     return Stages(fit.loop.runs, held, p, cut=False).fit_fine(friction, free, p)
 

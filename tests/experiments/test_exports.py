@@ -14,7 +14,6 @@ import yaml
 from noisy_logs import noisy_log
 
 import idbench
-from idbench.experiments.exports import ranges
 from idbench.experiments.exports.ensemble import Ensemble
 from idbench.experiments.exports.exports import EXPORTS
 from idbench.experiments.identification.consistent_estimate import drawn_about
@@ -80,10 +79,6 @@ def test_a_urdf_keeps_its_rotors(name, tmp_path, rng):
     np.testing.assert_allclose(inverse_dynamics(back, q, qd, qdd), tau, atol=1e-5 * np.abs(tau).max())  # angles of a URDF
     again = urdf_text(str(tmp_path / "arm.urdf"), back, kinematic_tree(back), standard_parameters(back), PLAIN)
     assert again.count("drake:rotor_inertia") == np.count_nonzero(robot.model.dof_armature)
-
-
-def test_all_files_beside_ranges_are_asked_for_before_the_work():
-    assert EXPORTS[".toml"].beside == (*ranges.CODE, ranges.PICTURE)
 
 
 def test_a_gear_ratio_counts_twice(tmp_path):

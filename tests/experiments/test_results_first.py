@@ -104,6 +104,14 @@ def test_a_held_out_log_that_cannot_be_judged_leaves_the_others(error, idbench, 
     assert (tmp_path / "found" / "report.html").is_file()
 
 
+def test_a_conclusion_that_fails_leaves_the_estimates(idbench, logs, tmp_path, monkeypatch):
+    monkeypatch.setattr("idbench.experiments.cli.commands.identify.conclusion", broken)
+    code, out, _ = idbench("identify", logs / "first.parquet", *WORDS, "--no-rerun", "--out", "found")
+    assert code == 1
+    assert "explicit model, WLS" in out
+    assert "explicit" in json.loads((tmp_path / "found" / "summary.json").read_text())["models"]
+
+
 def part(log, target, k):
     """Write a part of a log."""
     from idbench.identify.files.log_file import read_log, write_log

@@ -179,6 +179,15 @@ def test_the_page_takes_an_arm_to_a_model(root, tmp_path, monkeypatch, capfd):
         assert summary["joints"][joint]["a"]["value"] == pytest.approx(2.05 / 3.33, rel=0.01)
 
 
+@pytest.mark.thorough
+def test_estimates_are_printed_and_saved_whatever_ends_the_verdict(bench, idbench, tmp_path, monkeypatch):
+    monkeypatch.setattr("idbench.experiments.servo.job.ServosFit.summary", lambda _: 1 / 0)
+    code, out, _ = idbench(*words(bench, "--friction", "coulomb", "--out", tmp_path / "kept"))
+    assert code == 1
+    assert "Ia [kg m^2]" in out
+    assert json.loads((tmp_path / "kept" / "summary.json").read_text())["joints"]["axis"]["a"]["value"] > 0
+
+
 def test_position_actuators_compile(bench, tmp_path):
     text = with_servos(str(bench / "pendulum.xml"), {0: TRUTH}, tmp_path, position=True)
     model = mujoco.MjModel.from_xml_string(text)

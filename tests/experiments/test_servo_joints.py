@@ -8,6 +8,7 @@ import pytest
 
 from idbench.experiments.cli.options.jobs import IdentifyServo
 from idbench.experiments.servo import joints as module
+from idbench.experiments.servo import servo_text
 from idbench.experiments.servo.identification import summary_of
 from idbench.experiments.servo.job import held_of
 from idbench.experiments.servo.joints import Joints, JointsLog
@@ -16,9 +17,10 @@ from idbench.experiments.study.servo_rows import _joints
 from idbench.identify import IdentificationError, LogError
 from idbench.identify.files.layout import Asked
 from idbench.identify.files.servo_log import ServoColumns, read_servo_log
-from idbench.identify.servo import Servo, identify_again, identify_servo
-from idbench.identify.servo.identification import APART, per_offset
+from idbench.identify.servo import Servo, ServoFit, identify_again, identify_servo
+from idbench.identify.servo.identification import APART, per_offset, with_friction
 from idbench.identify.servo.mistakes import mistake_of
+from idbench.identify.servo.search import Found
 from idbench.identify.servo.stages import searched_runs
 from idbench.sim.engine.simulation import simulate
 from idbench.sim.robot.mounting import PLAIN
@@ -182,3 +184,28 @@ def test_a_wrong_kd_is_called_kd():
     mistake = SimpleNamespace(cause="lead", size=(-0.0557,), p=1e-9, alternatives=(), held_out=(0.06, 0.0005))
     fit = SimpleNamespace(servo=Servo(kp=25.0, kd=3.0, kind="torque"))
     assert mistake_words(mistake, fit).startswith("kd is 1.4 N m s/rad too large (p = 1e-09); with --find lead")
+
+
+def fitted(moved):
+    """Return what stands for a fit of a joint that moved by so much in the fitted log, without a mistake [rad]."""
+    return SimpleNamespace(loop=SimpleNamespace(step=0.0), explained=True, excitation=SimpleNamespace(range=moved), free=())
+
+
+@pytest.mark.parametrize(("moved", "joint", "word"), [(0.4, "b", "good"), (1e-4, "a", "poor")])
+def test_the_first_line_is_on_the_worst_joint_that_moved(monkeypatch, moved, joint, word):
+    """Joint a rests in the held-out log: errors in per cent of nothing; where all rest, one of them is there all the same."""
+    monkeypatch.setattr(servo_text, "_lacks", lambda _: "its residuals are small")
+    fits, off = {"a": fitted(1.0), "b": fitted(1.0)}, np.array([1e-3])
+    lines = servo_text.verdict_lines(fits, {"a": off, "b": off}, {"a": off, "b": off}, {"a": 1e-5, "b": moved}, {})
+    assert lines[0][0] == word
+    assert lines[0][1].startswith(f"Result: {word} ({joint}): positions off by")
+
+
+def test_friction_that_is_held_is_not_fitted_again():
+    p = {"Fs": 0.1, "Fv": 0.2, "Ia": 0.01, "offset": 0.0, "Fl": 0.5}
+    found = Found(p, 0.0, np.empty(0), np.empty(0), np.empty(0), None)
+    loop = SimpleNamespace(runs=[SimpleNamespace(load=SimpleNamespace(torque=lambda *_: np.ones(3)), t=None, clean=None)])
+    fit = ServoFit("load", ("Ia",), found, loop, None, (1.0, 1.0))
+    again = with_friction(fit, "coulomb")
+    assert again.p == {"Fs": 0.6, "Fv": 0.2, "Ia": 0.01, "offset": 0.0}
+    assert (again.friction, again.free) == ("coulomb", ())

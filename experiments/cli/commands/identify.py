@@ -12,6 +12,7 @@ from idbench.experiments.cli.saving import folder_of
 from idbench.experiments.errors import ExperimentError, RequirementError
 from idbench.experiments.identification.fit import Fit
 from idbench.experiments.identification.job import fit_of, loaded_logs, notes_of, request_of, summary_of
+from idbench.experiments.identification.known import number_of
 from idbench.experiments.identification.logs import delay_method
 from idbench.experiments.identification.reading import DELAY_FOUND, file_of
 from idbench.experiments.inputs import files_of
@@ -46,13 +47,13 @@ def identify(options: Identify) -> None:
                 with stages_of("judging" if options.validate else "judging, by a fit of the rest"):
                     judgement = attempts.attempt("the verdict", lambda: judge(result))
                 warnings = {} if judgement is None else _checked(judgement, options, attempts)
+                answer = None if judgement is None else conclusion(judgement, warnings)
             except BaseException:  # whatever ends it, the estimates are worth keeping
                 _show_fit(page, result, options, whole_models)
                 raise
-            if judgement is None:
+            if judgement is None or answer is None:
                 _show_fit(page, result, options, whole_models)
                 return
-            answer = conclusion(judgement, warnings)
             page.print(Text(answer.finding, f"bold {COLORS.get(answer.word, '')}".strip()), soft_wrap=True)
             page.print(Text(f"next: {answer.step}\n", "bold"), soft_wrap=True)
             _show_fit(page, result, options, whole_models)
@@ -71,13 +72,8 @@ def identify(options: Identify) -> None:
 
 def _required(options: Identify) -> float | None:
     """Share of torque errors that is required [%]."""
-    if options.require is None:
-        return None
-    try:
-        percent = float(options.require.strip().removesuffix("%"))
-    except ValueError:
-        percent = 0.0
-    if not 0 < percent < float("inf"):
+    percent = number_of((options.require or "").removesuffix("%"))
+    if options.require is not None and not (percent and 0 < percent < float("inf")):
         raise ExperimentError(f"--require {options.require}: give a share of torque errors above 0, as in 2%")
     return percent
 

@@ -9,6 +9,7 @@ from rich.text import Text
 from idbench.experiments.cli.command import command_of
 from idbench.experiments.cli.options.jobs import IdentifyServo
 from idbench.experiments.cli.saving import folder_of, require_targets, save_summary
+from idbench.experiments.document import Document
 from idbench.experiments.identification.robot_model import absolute
 from idbench.experiments.inputs import files_of
 from idbench.experiments.recording.audience import Audience
@@ -18,15 +19,7 @@ from idbench.experiments.results.page import COLORS, NOT_SAVED, Page, stages_of
 from idbench.experiments.results.writing import write_text
 from idbench.experiments.servo.job import ServosFit, servos_identified
 from idbench.experiments.servo.joints import Identified
-from idbench.experiments.servo.servo_files import (
-    bam_of,
-    for_mujoco,
-    in_mujoco,
-    inexpressible,
-    mjcf_of,
-    servo_function,
-    without_servo,
-)
+from idbench.experiments.servo.servo_files import bam_of, for_mujoco, in_mujoco, inexpressible, mjcf_of, servo_function
 from idbench.experiments.servo.servo_text import servo_table
 
 if TYPE_CHECKING:
@@ -39,9 +32,7 @@ def servo(options: IdentifyServo) -> None:
     require_targets(options.write, WRITERS, force=options.force, read=files_of(options))
     with options.watching.audience() as audience, closing(page), folder.held() if folder else nullcontext():
         page.found |= {"experiment": "servo", "robot": absolute(str(options.robot)), "friction": options.friction, "joints": {}}
-        made = _identified(page, folder, options)
-        page.found |= made.summary()
-        document = made.document()
+        made, document = _identified(page, folder, options)
         (word, first), *others = document.verdicts
         page.print(Text(first, f"bold {COLORS.get(word, '')}".strip()), soft_wrap=True)
         page.print(Text(f"next: {document.step}\n", "bold"), soft_wrap=True)
@@ -63,8 +54,8 @@ def servo(options: IdentifyServo) -> None:
         page.print(where, soft_wrap=True)
 
 
-def _identified(page: Page, folder: ResultsFolder | None, options: IdentifyServo) -> ServosFit:
-    """Return the fits; print and save those of joints that are done if the others are not waited for."""
+def _identified(page: Page, folder: ResultsFolder | None, options: IdentifyServo) -> tuple[ServosFit, Document]:
+    """Return the fits and what they say; whatever ends that, print the joints that are done, which are saved as they come."""
     last = list[ServosFit]()
 
     def heard(_joint: str, _result: Identified | str, made: ServosFit) -> None:
@@ -75,7 +66,9 @@ def _identified(page: Page, folder: ResultsFolder | None, options: IdentifyServo
 
     try:
         with stages_of("identifying"):
-            return servos_identified(options, heard)
+            made = servos_identified(options, heard)
+        page.found |= made.summary()
+        return made, made.document()
     except BaseException:
         if last and last[0].fits:
             servo_table(last[0].fits).show(page)
@@ -91,7 +84,9 @@ def _write(page: Page, options: IdentifyServo, path: Path, fit: ServosFit) -> No
     friction = ", ".join(f"{joint} Fs {own.p['Fs']:.3g} Fv {own.p['Fv']:.3g}" for joint, own in found.items() if "Fs" in own.p)
     if any(fit.fits[joint] is not own for joint, own in found.items()):
         page.print(Text(f"its friction is fitted again as MuJoCo has it: {friction}"), soft_wrap=True)
-    page.warn({"the written file": [*inexpressible(found), *without_servo(servos.links.joints, found)]})
+    bare = ", ".join(joint for joint in servos.links.joints if joint not in found)
+    kept = [f"{bare}: no servo is written; what the robot's file has there stays"] if bare else []
+    page.warn({"the written file": [*inexpressible(found), *kept]})
     judged = fit.others or servos
     for log in judged.logs:
         errors = in_mujoco(judged, found, place, log, options.position)
