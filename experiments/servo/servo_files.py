@@ -13,6 +13,7 @@ import numpy as np
 
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.exports.code import template
+from idbench.experiments.servo.bam import device_of_bam
 from idbench.experiments.servo.identification import Servos
 from idbench.identify.files.servo_file import ServoFile
 from idbench.identify.plugins import did_you_mean
@@ -34,33 +35,7 @@ def servo_function(robot: str, fits: Mapping[str, tuple[Servo, ServoFit]], logs:
     return template("servo.py").substitute(words, servos=table)
 
 
-BAM = {
-    "armature": "Ia", "friction_base": "Fs", "friction_viscous": "Fv", "friction_stribeck": "Fst", "dtheta_stribeck": "vs",
-    "load_friction_base": "Fl", "load_friction_stribeck": "Fls", "load_friction_motor": "Flm", "load_friction_external": "Fle",
-    "command_delay": "delay", "max_velocity": "rate",
-}  # fmt: skip
-"""Parameters of BAM (arXiv 2410.08650) -> letters; kt = b / a and R = b / a^2 are behind the gear there, too."""
-
-BAM_LAWS = {"coulomb": "m1", "stribeck": "m2", "load": "m3", "load-stribeck": "m4", "directional": "m5"}
-
-
-def bam_of(fit: ServoFit, model: str) -> tuple[str, list[str]]:
-    """Servo as JSON of BAM, and the letters that it leaves out; ExperimentError if BAM has no such servo."""
-    p = ServoLaw(**fit.p)._asdict()
-    if fit.friction not in BAM_LAWS or fit.servo.kind != Servo.kind or not model or min(p["a"], p["b"]) <= 0:
-        raise ExperimentError(
-            f"BAM has DC motors, of a model that servo.toml names, with friction {', '.join(BAM_LAWS)}; this is a loop of "
-            f"{fit.servo.kind}, model {model or 'not stated'}, with friction {fit.friction}, b = {p['b']:.3g}"
-        )
-    found = {name: float(p[letter]) for name, letter in BAM.items() if np.isfinite(p[letter])}
-    none = dict.fromkeys(("load_friction_motor_stribeck", "load_friction_external_stribeck"), 0.0)
-    motor = {"kt": p["b"] / p["a"], "R": p["b"] / p["a"] ** 2, "error_gain_ratio": 1 + p["gain_error"], "alpha": 1.0}
-    named = {"model": BAM_LAWS[fit.friction], "actuator": model.lower().replace("-", "")}
-    lost = [x for x in fit.p if x not in ("a", "b", "gain_error", "offset", *BAM.values()) and fit.p[x]]
-    return json.dumps(named | motor | found | none, indent=1, allow_nan=False) + "\n", lost
-
-
-EXPRESSIBLE = ("a", "b", "Ia", "Fs", "Fv", "offset", "lag", "lead", "delay", "rate", "backlash")
+EXPRESSIBLE = ("a", "b", "Ia", "Fs", "Fv", "offset", "lag", "lead", "delay", "rate", "backlash", "gain_error")
 """Parameters that a file of MuJoCo has, or that its user adds to commands."""
 
 
@@ -134,8 +109,10 @@ def devices() -> dict[str, dict[str, Any]]:
 
 
 def device_of(name: str) -> dict[str, Any]:
-    """A device; raise ExperimentError if none has this name."""
+    """A device, or that of a file of BAM; raise ExperimentError if there is none."""
     every = devices()
+    if name.endswith(".json"):
+        return device_of_bam(Path(name))
     if name not in every:
         raise ExperimentError(f"there is no device {name!r}{did_you_mean(name, every)}; there are {', '.join(every)}")
     return every[name]

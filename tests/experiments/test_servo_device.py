@@ -2,6 +2,7 @@
 
 import json
 from types import SimpleNamespace
+from xml.etree import ElementTree
 
 import mujoco
 import numpy as np
@@ -9,7 +10,8 @@ import pytest
 
 from idbench.experiments.cli import main
 from idbench.experiments.errors import ExperimentError
-from idbench.experiments.servo.servo_files import bam_of, device_of, devices, servo_function
+from idbench.experiments.servo.bam import bam_of
+from idbench.experiments.servo.servo_files import device_of, devices, servo_function
 from idbench.identify.files.servo_file import ServoFile
 from idbench.identify.servo import Servo
 
@@ -95,3 +97,75 @@ def test_what_bam_has_no_place_for_is_said_or_refused():
     for friction, loop, model in (("gear", servo, "MX-64"), ("coulomb", servo, ""), ("coulomb", Servo(kind="torque"), "MX-64")):
         with pytest.raises(ExperimentError, match="BAM has DC motors, of a model"):
             bam_of(SimpleNamespace(friction=friction, servo=loop, p=p), model)
+
+
+def bam_file(folder, **other):
+    """File as BAM writes it of a model M5."""
+    given = {"kt": 1.27, "error_gain_ratio": 1.16, "R": 2.75, "armature": 0.0216, "q_offset": -0.07, "max_velocity": 5.11,
+             "command_delay": 0.005, "friction_base": 0.053, "friction_stribeck": 0.02, "load_friction_motor": 0.04,
+             "load_friction_external": 0.24, "load_friction_motor_stribeck": 0.0, "load_friction_external_stribeck": 0.15,
+             "dtheta_stribeck": 0.37, "alpha": 1.0, "friction_viscous": 0.03, "model": "m5", "actuator": "sts3215"}  # fmt: skip
+    path = folder / "m5.json"
+    path.write_text(json.dumps({key: x for key, x in (given | other).items() if x is not None}))
+    return path
+
+
+def test_what_is_written_for_bam_is_read_back(tmp_path):
+    servo = Servo(gain=0.166, kp=16.0, supply=12.0, limit=0.97, counts=4096)
+    p = {
+        "a": 0.57,
+        "b": 1.18,
+        "Ia": 0.022,
+        "Fs": 0.12,
+        "Fv": 0.02,
+        "offset": 0.1,
+        "delay": 0.02,
+        "rate": 4.8,
+        "gain_error": 0.1,
+    }
+    known = {letter: x for letter, x in p.items() if letter != "offset"}
+    for law, more in LAWS.items():
+        path = tmp_path / "servo.json"
+        path.write_text(bam_of(SimpleNamespace(friction=law, servo=servo, p=p | more), "MX-64")[0])
+        read = device_of(str(path))
+        values = {letter: of["value"] for letter, of in read["parameters"].items()}
+        assert {letter: x for letter, x in values.items() if x} == pytest.approx({"vs": 1.0, **known, **more})
+        assert read["friction"] == law
+        assert read["beyond"] == {}
+        assert read["known"] == {"model": "MX-64"}
+
+
+def test_a_published_file_of_bam_becomes_a_dcmotor(idbench, tmp_path):
+    """Its motor: V = error_gain ratio kp vin (u - q), tau = kt (V - kt qd) / R, as BAM has it."""
+    path = bam_file(tmp_path)
+    code, out, _ = idbench("device", path, "--supply", 7.4, "--kp", 32, "--write", tmp_path / "arm.xml")
+    assert code == 0, out
+    assert "load_friction_external_stribeck = 0.15 has no place" in out
+    model = mujoco.MjModel.from_xml_path(str(tmp_path / "arm.xml"))
+    axis = model.actuator("swing_servo").trnid[0]
+    motor = ElementTree.parse(tmp_path / "arm.xml").find(".//dcmotor").attrib
+    kp, *_, most = map(float, motor["controller"].split())
+    assert (motor["motorconst"], motor["resistance"]) == ("1.27", "2.75")
+    assert kp * 2.75 / 1.27 == pytest.approx(1.16 * 0.166 * 32 * 7.4)  # V = (R/K) kp (u - q)
+    assert most == pytest.approx(0.97 * 7.4)
+    assert model.dof_armature[axis] == pytest.approx(0.0216)
+    assert model.dof_frictionloss[axis] == pytest.approx(0.053)
+
+
+@pytest.mark.parametrize(
+    ("other", "message"),
+    [
+        ({"R": None}, "it has no 'R'"),
+        ({"kt": 0.0}, "kt = 0.0 must be a finite number above 0"),
+        ({"model": "m9"}, "it has no 'm9'"),
+        ({"friction_base": -0.1}, "Fs = -0.1 is impossible"),
+        ({"armature": "heavy"}, "could not convert string to float: 'heavy'"),
+        ({}, "BAM does not write the supply: add --supply"),
+        ({"actuator": "erob80_50"}, "the gain of this actuator is not known; those of STS3215"),
+    ],
+)
+def test_a_wrong_file_of_bam_is_named(idbench, tmp_path, other, message):
+    code, _, err = idbench("device", bam_file(tmp_path, **other), "--write", tmp_path / "arm.xml")
+    assert code != 0
+    assert message in " ".join(err.split())
+    assert not (tmp_path / "arm.xml").exists()

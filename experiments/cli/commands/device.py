@@ -11,8 +11,10 @@ from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.robot_model import absolute
 from idbench.experiments.results.page import Page
 from idbench.experiments.results.writing import write_text
+from idbench.experiments.servo.bam import require_drive
 from idbench.experiments.servo.servo_files import BENCH, cannot_express, device_of, devices, mjcf_of_device, servo_toml_of
 from idbench.experiments.text import new_table, print_titled
+from idbench.identify.errors import require_positive
 from idbench.identify.tables import concise
 from idbench.sim.robot.robot import Robot
 
@@ -34,13 +36,19 @@ def device(options: ShowDevice) -> None:
         page.close()
         return
     known, places = device_of(options.name), [names.index(joint) for joint in options.joints or names]
+    if options.supply is not None:
+        require_positive(supply=options.supply)
+        known = {**known, "known": {**known["known"], "supply": options.supply}}
     page.found |= known
     _print(page, known)
+    beyond = known.get("beyond", {}).items()
+    page.warn({known["name"]: [f"{name} = {x:.3g} has no place in law {known['friction']}" for name, x in beyond]})
     for path in options.write:
+        require_drive(known)
         text, said = servo_toml_of(known, options.kp), "what is known of it, for idbench servo --servo"
         if path.suffix == ".xml":
             text = mjcf_of_device(known, robot, places, options.kp, path.absolute().parent)
-            said = f"{options.name} at {', '.join(names[j] for j in places)}"
+            said = f"{known['name']} at {', '.join(names[j] for j in places)}"
             page.warn({"the written file": cannot_express(known["parameters"])})
         write_text(path, text, "--write", force=options.force)
         page.print(f"written to {path}: {said}", soft_wrap=True)

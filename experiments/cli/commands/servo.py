@@ -17,9 +17,10 @@ from idbench.experiments.results.attempts import Attempts
 from idbench.experiments.results.folder import ResultsFolder
 from idbench.experiments.results.page import COLORS, NOT_SAVED, Page, stages_of
 from idbench.experiments.results.writing import write_text
+from idbench.experiments.servo.bam import bam_of
 from idbench.experiments.servo.job import ServosFit, servos_identified
 from idbench.experiments.servo.joints import Identified
-from idbench.experiments.servo.servo_files import bam_of, for_mujoco, in_mujoco, inexpressible, mjcf_of, servo_function
+from idbench.experiments.servo.servo_files import for_mujoco, in_mujoco, inexpressible, mjcf_of, servo_function
 from idbench.experiments.servo.servo_text import servo_table
 
 if TYPE_CHECKING:

@@ -76,16 +76,18 @@ class Export(Command, called="export", action="logs:export"):
 
 @dataclass(frozen=True)
 class ShowDevice(Command, called="device", action="device:device"):
-    """Print a servo that was identified from public logs, with standard errors, or list them; write it for MuJoCo."""
+    """Print a servo that was identified from public logs, with standard errors, or of a file of BAM; write it for MuJoCo."""
 
     name: Annotated[str, Word("NAME", positional=True)] = ""
-    """Of the device. Default: list all."""
+    """Name of the device, or a parameter file (.json) of BAM. Default: list all."""
     robot: Annotated[str | None, Word("ROBOT")] = None
     """Robot that it drives: name, or file (MJCF or URDF). Default: a pendulum."""
     joints: words.Joints = ()
     """Joints that it drives. Default: all."""
     kp: float = 16.0
     """Gain of the firmware."""
+    supply: Annotated[float | None, Word("V")] = None
+    """Supply. Default: that at which the device was measured, which files of BAM do not have."""
     write: words.Files = ()
     """Files to write: .xml, the robot with the device as `dcmotor` actuators; .toml, a servo.toml of what is known of it."""
     force: bool = False
