@@ -1,6 +1,9 @@
 """What leaves an identification is one robot: in every file, in what training frameworks draw, and beside its truth."""
 
+import ctypes
 import importlib.util
+import shutil
+import subprocess
 import sys
 import tomllib
 import warnings
@@ -251,6 +254,53 @@ def test_a_hundred_drawn_robots_err_by_what_intervals_say(puma, motion, framewor
             assert np.all(np.sqrt(np.mean(off**2, axis=0)) < 0.02 * size)
         assert np.mean(inside) > 0.95
         assert np.ptp(fields["body_mass"], axis=0).max() > 0  # they differ
+
+
+def tracking(torque):
+    """Rms errors of the true PUMA in MuJoCo [rad], shape (joint,): tau = ID(q, qd, qdd_d + 2 w (qd_d - qd) + w^2 (q_d - q))."""
+    robot, w = Robot.load("puma560"), 20.0
+    planned = RandomMoves(moves=4, durations=(0.8, 1.2), velocity=(2.0,), seed=51).sample(robot, 1000.0)
+    model = robot.model
+    model.opt.timestep, model.opt.integrator = 0.001, mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    data, off = mujoco.MjData(model), []
+    data.qpos[:] = planned.q[0]
+    for q, qd, qdd in zip(planned.q, planned.qd, planned.qdd, strict=True):
+        off.append(q - data.qpos)
+        data.qfrc_applied[:] = torque(data.qpos, data.qvel, qdd + 2 * w * (qd - data.qvel) + w**2 * off[-1])
+        mujoco.mj_step(model, data)
+    return np.sqrt(np.mean(np.square(off), axis=0))
+
+
+@pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler")
+@pytest.mark.thorough
+def test_a_loop_with_the_identified_c_tracks_as_with_the_true_model(puma):
+    """Computed torque at 1 kHz, with torques of the written C, of the true robot, and of the CAD."""
+    found, folder = puma
+    found.write(str(folder / "arm.c"))
+    code = """#include "arm.h"
+void torque(const double *q, const double *qd, const double *qdd, double *tau)
+{
+    const struct arm_parameters p = ARM_IDENTIFIED;
+    arm_inverse_dynamics(q, qd, qdd, &p, tau);
+}
+"""
+    (folder / "shim.c").write_text(code)
+    given = "-shared", "-fPIC", folder / "shim.c", folder / "arm.c", "-lm", "-o", folder / "arm.so"
+    subprocess.run(["cc", "-std=c99", "-O2", *given], check=True)
+    call = ctypes.CDLL(str(folder / "arm.so")).torque
+
+    def of_c(*motion):
+        own, tau = [np.ascontiguousarray(x) for x in motion], np.empty(6)
+        call(*(x.ctypes.data_as(ctypes.c_void_p) for x in (*own, tau)))
+        return tau
+
+    def of_file(path):
+        robot = Robot.load(path)
+        return lambda *motion: torques(robot, [x[None] for x in motion])[0]
+
+    true, c, nominal = map(tracking, (of_file("puma560"), of_c, of_file(str(folder / "cad.xml"))))
+    assert np.all(c < 1.5 * true)  # sigma of the estimate, and Coulomb friction that turns over where it rests
+    assert np.all(nominal > 10 * true)
 
 
 @pytest.mark.thorough
