@@ -143,15 +143,18 @@ class Page(Console):
             yield Segment(text if control else visible(text), style, control)
 
     def warn(self, groups: Mapping[str, Sequence[str]]) -> None:
-        """Print warnings by what they are about, in the order in which to check them."""
-        there = {about: warnings for about, warnings in groups.items() if warnings}
+        """Print warnings by what they are about, in the order in which to check them, each once on a page."""
+        kept: dict[str, list[str]] = self.found.setdefault("warnings", {})
+        said = {warning for warnings in kept.values() for warning in warnings}
+        new = {about: [x for x in dict.fromkeys(warnings) if x not in said] for about, warnings in groups.items()}
+        there = {about: warnings for about, warnings in new.items() if warnings}
         if len(there) > 1:
             self.print(Text("Check these first, in this order:", style="bold"))
         for number, (about, warnings) in enumerate(there.items(), 1):
-            for k, warning in enumerate(dict.fromkeys(warnings)):
+            kept.setdefault(about, []).extend(warnings)
+            for k, warning in enumerate(warnings):
                 first = f"{number}. {about}: " if k == 0 else "   "
                 self.print(Text(f"{first if len(there) > 1 else 'warning: '}{warning}"), soft_wrap=True)
-        self.found["warnings"] = {**self.found.get("warnings", {}), **there}
 
     def show(self) -> None:
         """Show what has been printed since the last time."""

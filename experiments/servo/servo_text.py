@@ -59,13 +59,14 @@ def servo_table(fits: Mapping[str, ServoFit], errors: Mapping[str, Mapping[str, 
 
 
 def value_of(fit: ServoFit, name: str) -> str:
-    """A parameter with its standard error, or the factor that it is known up to."""
+    """A parameter with its standard error, and the factor that it is known up to beside that."""
     if name not in fit.p:
         return ""
-    if name in fit.unscaled:
-        return "no scale" if name == "offset" else "{} x {:.2g} to {:.2g}".format(number(fit.p[name]), *fit.factor)
+    if name in fit.unscaled and name == "offset":
+        return "no scale"
     sigma = fit.standard_errors.get(name)
-    return f"{number(fit.p[name])} held" if sigma is None else concise(fit.p[name], sigma)
+    value = f"{number(fit.p[name])} held" if sigma is None else concise(fit.p[name], sigma)
+    return "{} x {:.2g} to {:.2g}".format(value, *fit.factor) if name in fit.unscaled else value
 
 
 def warnings_of(fits: Mapping[str, ServoFit | str], mistakes: Collection[str] = ()) -> list[str]:
@@ -96,6 +97,8 @@ def _warnings(fit: ServoFit, mistaken: bool) -> Iterator[str]:
             f"{named} are known up to a common factor ({low:.2g} to {high:.2g}){offset}, because {why}. Positions are "
             f"predicted all the same; {way}"
         )
+    if "backlash" in fit.free and fit.p["backlash"] < 2 * fit.standard_errors["backlash"]:
+        yield f"backlash {value_of(fit, 'backlash')} is none that this log shows; play behind the encoder that it logs never is"
     kind = fit.servo.kind
     if kind == "duty" and not fit.excitation.off and "b" in fit.free:
         yield "torque is never off, so b is the sum of back-EMF and viscous friction, and Fv is 0"
