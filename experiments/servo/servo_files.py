@@ -46,8 +46,8 @@ def cannot_express(letters: Iterable[str], motor: bool = True) -> list[str]:
     return [f"MuJoCo's dcmotor cannot express {meanings}: what is simulated with the file lacks that"] if lost else []
 
 
-def inexpressible(fits: Mapping[str, ServoFit]) -> list[str]:
-    """Identified effects that MuJoCo's servos lack."""
+def inexpressible(fits: Mapping[str, ServoFit], identified: Mapping[str, ServoFit]) -> list[str]:
+    """Effects of what was identified that MuJoCo's servos lack, of those that are written."""
     motor = any(fit.servo.kind == Servo.kind for fit in fits.values())
     found = cannot_express((x for fit in fits.values() for x in fit.p if fit.p[x]), motor)
     if any("backlash" in fit.free for fit in fits.values()):
@@ -56,8 +56,8 @@ def inexpressible(fits: Mapping[str, ServoFit]) -> list[str]:
         found.append("commanded velocities and torques have no place in the file: it is judged without them")
     words = ", ".join(f"{joint} {fit.offset:+.4g}" for joint, fit in fits.items())
     found.append(f"the file's angles are the log's plus an offset [rad]: {words}; add it to commands")
-    if unknown := [joint for joint, fit in fits.items() if "offset" in fit.unscaled]:
-        found.append(f"{', '.join(unknown)}: torques have no scale, so the offset is not known, and taken as 0")
+    if unknown := [joint for joint, fit in identified.items() if "offset" in fit.unscaled]:
+        found.append(f"{', '.join(unknown)}: torques have no scale, so the offset is not known")
     return found
 
 

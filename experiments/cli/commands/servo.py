@@ -87,7 +87,7 @@ def _write(page: Page, options: IdentifyServo, path: Path, fit: ServosFit) -> No
         page.print(Text(f"its friction is fitted again as MuJoCo has it: {friction}"), soft_wrap=True)
     bare = ", ".join(joint for joint in servos.links.joints if joint not in found)
     kept = [f"{bare}: no servo is written; what the robot's file has there stays"] if bare else []
-    page.warn({"the written file": [*inexpressible(found), *kept]})
+    page.warn({"the written file": [*inexpressible(found, fit.fits), *kept]})
     judged = fit.others or servos
     for log in judged.logs:
         errors = in_mujoco(judged, found, place, log, options.position)
