@@ -57,8 +57,8 @@ def device_of_bam(path: Path) -> dict[str, Any]:
         raise ExperimentError(f"{path} is no parameter file of BAM (model, actuator, kt, R, armature ...): {wrong}") from error
     a = motor["kt"] / motor["R"]
     values = {"a": a, "b": motor["kt"] * a} | values | ({"gain_error": ratio - 1} if ratio != 1 else {})
-    if wrong := [x for x, value in values.items() if not SERVO_PARAMETERS[x].low <= value < np.inf]:
-        raise ExperimentError(f"{path}: {wrong[0]} = {values[wrong[0]]:g} is impossible")
+    if impossible := [x for x, value in values.items() if not SERVO_PARAMETERS[x].low <= value < np.inf]:
+        raise ExperimentError(f"{path}: {impossible[0]} = {values[impossible[0]]:g} is impossible")
     beyond = {name: x for name, x in given.items() if name not in (*BAM, *RIG) and x and x != NONE.get(name)}
     of = {
         x: {"value": values[x], "sigma": None, "spread": None, "unit": y.unit}
