@@ -107,7 +107,6 @@ def kind_colors(kind: str, n: int) -> list[list[int]]:
     return [lighter(color, SHADES.get(kind, 0)) for color in joint_colors(n)]
 
 
-UNBELIEVED = 1e-15  # Probability below which its size says nothing
 WORTHLESS = 999.0  # Percentages from here on all say the same
 
 
@@ -231,11 +230,6 @@ def percentage(x: float) -> str:
 def relative(x: float, sigma: float) -> str:
     """Return a standard error in per cent of its value; a question mark if it is not known."""
     return "?" if isnan(sigma) else percentage(100 * sigma / abs(x) if x else float("inf"))
-
-
-def probability(p: float) -> str:
-    """Return a probability to two digits with its sign, = or <."""
-    return f"= {p:.2g}" if p >= UNBELIEVED else f"< {UNBELIEVED:g}"
 
 
 def error_percentage(share: float) -> str:

@@ -192,16 +192,8 @@ def json_text(fit: Fit, model: str) -> str:
         "letters_of_links": list(INERTIAL),
         "gravity": [float(x) for x in robot_model.tree.gravity],
         "tree": [
-            {
-                "joint": joint.name,
-                "kind": joint.kind,
-                "parent": joint.parent,
-                "position": joint.position.tolist(),
-                "rotation": joint.rotation.tolist(),
-                "axis": joint.axis.tolist(),
-                "anchor": joint.anchor.tolist(),
-                "zero": float(joint.zero),
-            }
+            {"joint": joint.name, "kind": joint.kind, "parent": joint.parent, "zero": float(joint.zero)}
+            | {name: getattr(joint, name).tolist() for name in ("position", "rotation", "axis", "anchor")}
             for joint in robot_model.tree.joints
         ],
     }

@@ -6,7 +6,7 @@ from collections.abc import Set as AbstractSet
 import rerun.blueprint as rrb
 
 from idbench.experiments.errors import ResultsError
-from idbench.experiments.recording.chart import NARROW, SQUARE
+from idbench.experiments.recording.chart import NARROW
 from idbench.experiments.recording.run_layouts import RUN_LAYOUTS, residuals
 from idbench.experiments.recording.views import (
     ACROSS,
@@ -59,9 +59,8 @@ def compare(shelf: Shelf) -> Part:
 
 
 def excited(shelf: Shelf) -> Part:
-    """Return a designed motion: the arm, limits in use, predicted standard errors, and when they come about."""
-    sigmas = charts(shelf, "predicted sigma", "excited/sigma/*", SQUARE)
-    if not (told := charts(shelf, "which stretch excites which parameter: bright is most", "excited/told/*")):
+    """Return a designed motion: the arm, the motion, and limits in use."""
+    if not shelf.of("q/designed"):
         return None
     limits = [
         plot(shelf, f"{path.partition('_')[2].replace('_', ' ')} [% of its limit]", f"limits/{path}")
@@ -69,11 +68,7 @@ def excited(shelf: Shelf) -> Part:
     ]
     left = column(arm(shelf), text(shelf, "about"), shares=[5, 3])
     motion = plot(shelf, "q [rad]", "q/designed"), plot(shelf, "qd [rad/s]", "qd/designed")
-    middle = column(*motion, column(*limits), shares=[1, 1, 4])
-    names = [path.partition("_")[2].replace("_", " ") for path in sorted(shelf.parts("excited/told/*/frame", -2))]
-    pairs = zip(names, sigmas or [None] * len(told), told, strict=True)
-    each = [column(*pair, shares=[1, 1], name=name) for name, *pair in pairs]
-    return side_by_side("excited", left, middle, tabbed(each) if len(each) > 1 else each[0], shares=[5, 5, 6])
+    return side_by_side("excited", left, column(*motion, column(*limits), shares=[1, 1, 4]), shares=[1, 1])
 
 
 def servos(shelf: Shelf) -> Part:

@@ -39,19 +39,8 @@ MOST_POINTS = 1_000_000
 
 MOST_METHODS = 1000  # Identifications of every run, above which axes are taken for a slip
 
-RESULTS = (
-    "run",
-    "seed",
-    "chain",
-    "estimator",
-    "model",
-    "failure",
-    "condition_number",
-    "rows",
-    "residual_rms",
-    "simulations",
-    *NAMED,
-)
+OF_RUN = "run", "seed", "chain", "estimator", "model", "failure", "condition_number", "rows", "residual_rms", "simulations"
+RESULTS = (*OF_RUN, *NAMED)
 """Columns of the results beside those of axes and parameters."""
 
 SEVERITY = "severity"

@@ -244,16 +244,6 @@ class Estimate:
         """Root mean square of the residual over the rows that are not void, shape (...)."""
         return np.sqrt(self.problem.factors.together.squares(self.X) / np.maximum(self.row_count, 1))
 
-    def __str__(self) -> str:
-        if self.X.ndim > 1:
-            return f"estimates of {', '.join(self.names)} in {self.X.shape[:-1]} runs"
-        lines = [f"{'':8}{'X':>12}{'sigma':>12}{'%sigma':>9}"]
-        values = zip(self.names, self.X, self.standard_errors, strict=True)
-        lines += [f"{name:8}{x:12.5g}{s:12.2g}{100 * s / abs(x) if x else np.inf:9.2g}" for name, x, s in values]
-        return "\n".join(
-            [*lines, f"Cond(W) = {self.condition_number:.1f}, {self.row_count} rows, residual rms {self.residual_rms:.3g}"]
-        )
-
     def error_percent(self, truth: npt.ArrayLike) -> Array:
         """Return 100 (X - truth) / |truth|, shape (..., p); NaN where the truth is 0."""
         true = np.asarray(truth, dtype=np.float64)

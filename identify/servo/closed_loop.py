@@ -127,12 +127,6 @@ def targets(command: Array, rate: float, h: float) -> Array:
     return means
 
 
-def friction(p: ServoLaw, speed: float, motor: float, external: float, sent: float) -> float:
-    """Torque by which friction can resist at most [N m], for torques of motor and load, and what the gear transmits."""
-    run = function("servo_friction", c_void_p, *[c_double] * 4, result=c_double)
-    return float(run(pointer(np.array(p)), speed, motor, external, sent))
-
-
 def count_of(runs: Sequence[ServoRun]) -> float:
     """Angle of a count [rad] if nearly all positions are whole counts, else 0, as where they were filtered.
 

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 from rich.console import Console
 from set_tables import print_rows
 from set_tools import judged, predictions, what_tools_read, write_for_tools
@@ -40,7 +41,7 @@ from idbench.experiments.servo.identification import Servos, summary_of
 from idbench.experiments.servo.job import servos_identified
 from idbench.experiments.text import SIGMAS
 from idbench.identify import Array, Estimate, IdentificationError, MotionLog
-from idbench.identify.judge.excitation import seen
+from idbench.identify.data.log_columns import LogColumns
 from idbench.identify.judge.validation import split
 from idbench.sim.engine.driven import shoot
 from idbench.sim.errors import BenchError, ScenarioError
@@ -103,6 +104,33 @@ def read_definition(folder: Path) -> Definition:
 def _named(folder: Path, names: Sequence[str]) -> dict[str, None]:
     found = [sorted(str(path.relative_to(folder)) for path in folder.glob(name)) or [name] for name in names]
     return dict.fromkeys(name for each in found for name in each)
+
+
+def seen(held_out: MotionLog | LogColumns, fitted: Sequence[MotionLog | LogColumns]) -> int:
+    """Number of moving samples of a log that are also in others: equal positions and torques.
+
+    A robot that rests repeats its readings; noise of the torques tells other samples apart. Logs that were put on another clock
+    do not have their samples any more: give the columns of their files. Torques with a clock of their own are not compared.
+
+    Parameters
+    ----------
+    held_out : MotionLog or LogColumns
+        One run.
+    fitted : sequence of MotionLog or LogColumns
+        Those of the fit.
+    """
+    own = _keys(held_out)
+    moving = np.zeros(len(own), dtype=bool)
+    moving[1:] = (np.diff(held_out.q, axis=0) != 0).any(axis=1)
+    others = np.concatenate([keys for keys in map(_keys, fitted) if keys.dtype == own.dtype] or [own[:0]])
+    return int(np.isin(own, others)[moving].sum())
+
+
+def _keys(log: MotionLog | LogColumns) -> npt.NDArray[np.void]:
+    """Return the samples of a log as values that can be compared whole, shape (time,)."""
+    parts = [log.q, log.tau] if len(log.tau) == len(log.q) else [log.q]
+    rows = np.ascontiguousarray(np.concatenate(parts, axis=1)) + 0.0  # -0 is 0
+    return rows.view([("", rows.dtype)] * rows.shape[1]).ravel()
 
 
 def request_in(folder: Path, definition: Definition) -> IdentifyRequest | ServoRequest:

@@ -1,6 +1,7 @@
 """The compiled loop against the same loop in NumPy, where it stops for Python, and how errors of MuJoCo end in it."""
 
 import re
+from ctypes import c_double, c_void_p
 from dataclasses import replace
 from importlib.resources import files
 
@@ -10,9 +11,8 @@ import pytest
 from numpy_engine import simulated
 
 from idbench import models
-from idbench.identify.compiled import library
+from idbench.identify.compiled import function, library, pointer
 from idbench.identify.errors import IdentificationError
-from idbench.identify.servo.closed_loop import friction
 from idbench.identify.servo.parameters import ServoLaw
 from idbench.sim.controllers import PID, AbstractController, AbstractLaw, ComputedTorque
 from idbench.sim.drives import AveragedDrive, SwitchedDrive
@@ -277,7 +277,7 @@ def test_the_written_friction_of_a_servo_is_that_of_c(rng):
     written = {}
     exec(text.replace("$servos", repr({"hip": {k: float(x) for k, x in p._asdict().items()}})), written)
     servo = written["Servo"]("hip", 1e-3)
+    in_c = function("servo_friction", c_void_p, *[c_double] * 4, result=c_double)
     for speed, motor, external, sent in rng.uniform(-2, 2, (20, 4)).tolist():
-        assert servo.friction(speed, motor, external, sent) == pytest.approx(
-            friction(p, speed, motor, external, sent), rel=1e-12
-        )
+        expected = in_c(pointer(np.array(p)), speed, motor, external, sent)
+        assert servo.friction(speed, motor, external, sent) == pytest.approx(expected, rel=1e-12)
