@@ -46,6 +46,7 @@ FORMS: dict[str, Color] = {
     "power": (214, 39, 40),
     "energy": (0, 110, 90),
     "integral": (60, 90, 160),
+    "explicit+power": (150, 120, 0),
 }
 """Colours of the models."""
 
@@ -57,6 +58,7 @@ AGAIN: dict[str, tuple[Color, ...]] = {
     "power": ((250, 150, 150), (170, 20, 60)),
     "energy": ((120, 190, 170), (0, 70, 60)),
     "integral": ((150, 170, 220), (20, 50, 110)),
+    "explicit+power": ((210, 190, 90), (100, 80, 0)),
 }
 """Colours of the models in a second and a third identification of a log."""
 

@@ -193,6 +193,28 @@ def integral() -> ImplicitModel:
     return ImplicitModel(integrated=True)
 
 
+@dataclass(frozen=True)
+class ExplicitAndPowerModel(AbstractModel):
+    """Explicit model and power as one more row, [tau; qd' tau] = [D; qd' Gamma_f + s h] X (Eq. 5, 6, 10), of the same noise."""
+
+    def B(self, state: State) -> Multipliers:
+        """Return 1, and below it qd'."""
+        return {**super().B(state), **{(state.n, j): state.qd[..., j, :] for j in range(state.n)}}
+
+    def c(self, basis: Basis, state: State) -> Columns:
+        """Return D(q, qd, qdd), and below it the dissipated power."""
+        return {**basis.explicit(state), **_below(state.n, basis.dissipation(state))}
+
+    def e(self, basis: Basis, state: State) -> Columns:
+        """Return the energies h(q, qd), in the last row."""
+        return _below(state.n, basis.energy(state))
+
+
+def _below(n: int, columns: Columns) -> Columns:
+    """Return the columns of one row as those of row n."""
+    return {(n, place): column for (_, place), column in columns.items()}
+
+
 THREE = ("explicit", "implicit", "power")  # The paper's models, which are compared where no other is asked for
 
 MODELS: Table[AbstractModel] = Table(
@@ -204,5 +226,6 @@ MODELS: Table[AbstractModel] = Table(
         "power": PowerModel,
         "energy": energy,
         "integral": integral,
+        "explicit+power": ExplicitAndPowerModel,
     },
 )

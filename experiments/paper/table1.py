@@ -122,7 +122,7 @@ class Table1:
     @cached_property
     def estimates(self) -> dict[str, dict[str, Estimate]]:
         """The estimate of every form, by chain; two are integrated: energy (Eq. 11, 20), and integral (after Eq. 9)."""
-        log, rest, models = self.log, self.scenario.quintic().rest, {name: MODELS.create(name) for name in MODELS}
+        log, rest, models = self.log, self.scenario.quintic().rest, {name: MODELS.create(name) for name in (*PAPER, *OVER)}
         chains = {name: settled(name, rest, log.fs, log.torque) for name in self.chains}
         return {name: identify_each(log, scara(), models, chain, OrdinaryLeastSquares()) for name, chain in chains.items()}
 

@@ -14,8 +14,9 @@ from idbench.identify.models import THREE
 
 DRAWS = 2000  # Of a bootstrap: the ends of an interval are then known to some 3 % of its width
 
-PAIRS = (("implicit", "explicit"), ("power", "explicit"), ("energy", "power"), ("integral", "implicit"))
-"""Models that the paper compares: the one whose errors are divided, and by whose."""
+PAPERS = (("implicit", "explicit"), ("power", "explicit"), ("energy", "power"), ("integral", "implicit"))
+PAIRS = (*PAPERS, ("explicit+power", "explicit"))
+"""Models that are compared: the one whose errors are divided, and by whose."""
 
 NOISES = {
     "ripple": "with ripple, the paper's experiment",
