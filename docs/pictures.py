@@ -108,12 +108,14 @@ PAGES = {
 
 
 CHARTS = {
-    "conclusion": "conclusion_tables",
-    "benchmark": "benchmark_tables",
-    "estimators": "estimator_tables",
-    "faults": "fault_tables",
+    "conclusion": "conclusion_tables.picture",
+    "benchmark": "benchmark_tables.picture",
+    "estimators": "estimator_tables.picture",
+    "faults": "fault_tables.picture",
+    "smallest": "answers_tables.draw_smallest",
+    "moves": "answers_tables.draw_moves",
 }
-"""Pictures that are drawn from the figures in docs/results, and the module of docs/build that draws them."""
+"""Pictures that are drawn from the figures in docs/results, and what draws them in docs/build."""
 
 REAL = {
     "real-log": ("log train.csv --write --force --picture real-log.png",),
@@ -161,7 +163,8 @@ def charts(names: list[str]) -> None:
     """Draw pictures from kept figures."""
     sys.path.insert(0, str(DOCS / "build"))
     for name in names:
-        import_module(CHARTS[name]).picture(DOCS / f"{name}.png")
+        module, function = CHARTS[name].split(".")
+        getattr(import_module(module), function)(DOCS / f"{name}.png")
         print(f"{name}: drawn from docs/results")
 
 

@@ -14,6 +14,7 @@ from math import log2
 from pathlib import Path
 from typing import Any
 
+from answers_tables import ANSWERS_TABLES
 from benchmark_tables import BENCHMARK_TABLES
 from conclusion_sentences import sentences
 from conclusion_tables import CONCLUSION_TABLES, keep_conclusion
@@ -175,6 +176,7 @@ TABLES: dict[str, Callable[[], Iterator[str]]] = {
     "sentences": sentences,
     **CONCLUSION_TABLES,
     **SIMULATED_TABLES,
+    **ANSWERS_TABLES,
 }
 
 if __name__ == "__main__":

@@ -74,14 +74,14 @@ Files = str | Path | Sequence[str | Path]
 
 
 def study(
-    name: str | Path, *, seeds: int | None = None, out: str | Path | None = None, threads: int | None = None, **parts: Any
+    name: str | Path | Study, *, seeds: int | None = None, out: str | Path | None = None, threads: int | None = None, **parts: Any
 ) -> StudyTable:
     """Return a study that was run: errors and coverage of every combination.
 
     Parameters
     ----------
-    name : str or Path
-        Name of a shipped study (`idbench study` lists them), or its file (TOML).
+    name : str, Path or Study
+        Name of a shipped study (`idbench study` lists them), its file (TOML), or the study itself.
     seeds : int, optional
         Independent runs per combination, instead of the study's number.
     out : str or Path, optional
@@ -109,7 +109,7 @@ def study(
     changed: dict[str, Any] = {key: tuple(map(tables[key].name_of, several(value))) for key, value in parts.items()}
     if seeds is not None:
         changed["seeds"] = seeds
-    described = replace(load_study(str(name)), **changed)
+    described = replace(name if isinstance(name, Study) else load_study(str(name)), **changed)
     asked = jobs.StudyRequest(threads=threads)
     with TemporaryDirectory(prefix="idbench-") as folder:
         store = _store(described, Path(folder) / described.name if out is None else Path(out))

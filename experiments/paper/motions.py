@@ -22,7 +22,7 @@ from rich.table import Table
 from rich.text import Text
 
 from idbench.experiments.errors import ExperimentError
-from idbench.experiments.paper.table1 import PAPER
+from idbench.experiments.paper.table1 import PAPER, over_explicit
 from idbench.experiments.study.job import local_pool
 from idbench.experiments.study.study import Study
 from idbench.experiments.study.study_file import load_study
@@ -149,7 +149,7 @@ class Table1Motions:
             }
             for model in PAPER
         }
-        return {"drawn": errors.drawn, "kept": errors.kept, "models": models}
+        return {"drawn": errors.drawn, "kept": errors.kept, "models": models, "over_explicit": relations(errors)}
 
 
 FEW = 40  # Motions below which less than two lie outside of either end of the band
@@ -192,11 +192,25 @@ def _said(found: Table1Motions, chain: str) -> str:
     times = errors.percentiles("explicit", 50)[which] / np.array(PAPER["explicit"].error)[which]
     friction = float(np.exp(np.mean(np.log(times))))
     few = f"; so few motions make no band, draw more than {found.motions}" if errors.kept < FEW else ""
+    each = "those of {0} are {paper:.2g} times or more in {reached:.0%}, all larger in {all_larger:.0%}"
+    over = [each.format(model, **of) for model, of in relations(errors).items()]
     return (
         f"{NAMES[chain]} (chain {chain}): {errors.kept} of {errors.drawn} motions have the paper's Cond(W) within "
         f"{found.tolerance:.0%}; {inside} of {cells} of the paper's errors lie inside the band; the friction errors of the "
-        f"explicit model are {friction:.2g} times the paper's (geometric mean of the medians){few}"
+        f"explicit model are {friction:.2g} times the paper's (geometric mean of the medians){few}. "
+        f"Over the explicit model's errors, {'; '.join(over)} of these motions"
     )
+
+
+def relations(errors: Errors) -> dict[str, dict[str, float]]:
+    """Errors of other models over the explicit one's: the paper's, the median, and shares of motions that have them."""
+    found = dict[str, dict[str, float]]()
+    for model, paper in over_explicit({model: column.error for model, column in PAPER.items()}).items():
+        times = errors.percent[model] / errors.percent["explicit"]
+        means, worse = np.exp(np.log(times).mean(axis=1)), float((times > 1).all(axis=1).mean())
+        shares = {"reached": float((means >= paper).mean()), "all_larger": worse}
+        found[model] = {"paper": paper, "median": float(np.median(means)), **shares}
+    return found
 
 
 def picture(found: Table1Motions) -> bytes:

@@ -21,7 +21,7 @@ from idbench.experiments.identification.method import Method
 from idbench.experiments.identification.request import Request
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.paper.attribution import Attribution, Errors
-from idbench.experiments.paper.table1 import conclusion_line, paper_columns, settled
+from idbench.experiments.paper.table1 import conclusion_line, over_explicit, paper_columns, settled
 from idbench.experiments.text import new_table, percent, print_table, printed
 from idbench.identify import Estimate, TorqueChannel
 from idbench.sim.engine.run import Run
@@ -148,6 +148,10 @@ def print_table2(console: Console, table: Table2) -> None:
     console.print(
         Text("2s: 2 sigma, %s: %sigma, %e: error. Processed as in the paper (chain paper, OLS), and by chain idbench, WLS.\n")
     )
+    sigmas: dict[str, dict[str, Any]] = {"the paper": {model: column.two_sigma for model, column in PAPER.items()}}
+    sigmas |= {name: {m: one.estimates[m].own_sigma for m, one in each.items()} for name, each in table.found.items()}
+    over = ", ".join(f"{over_explicit(of)['power']:.2g} ({name})" for name, of in sigmas.items())
+    console.print(Text(f"Sigmas of the power model over those of the explicit one, geometric means: {over}.\n"))
     console.print(Text("What each imperfection does alone, chain idbench: error of each parameter [%]\n"))
     for form in next(iter(table.attribution.values())):
         grid = new_table(f"{form} model", table.truth)

@@ -14,12 +14,11 @@ from idbench.identify.models import THREE
 
 DRAWS = 2000  # Of a bootstrap: the ends of an interval are then known to some 3 % of its width
 
-PAPERS = (("implicit", "explicit"), ("power", "explicit"), ("energy", "power"), ("integral", "implicit"))
-PAIRS = (*PAPERS, ("explicit+power", "explicit"))
+PAIRS = (("implicit", "explicit"), ("power", "explicit"), ("energy", "power"), ("integral", "implicit"))
 """Models that are compared: the one whose errors are divided, and by whose."""
 
 NOISES = {
-    "ripple": "with ripple, the paper's experiment",
+    "ripple": "with ripple",
     "torque": "with white torque noise",
     "encoder": "with a 14-bit encoder alone",
     "all": "with all of them",
@@ -107,6 +106,10 @@ def conclusion(found: Sequence[RatioRow]) -> str:
         )
     elif power:
         words.append(f"With equal numbers of rows, the power model's are {_span(power)} times as large")
+    if stated and (
+        papers := [row for row in _of(found, ["power", "explicit"], chain="paper", estimator="OLS") if _ripple(row)]
+    ):
+        words[-1] += f" (the paper's experiment, with ripple and in its chain: {interval(papers[0])})"
     if stated and (weighted := _of(power, ["power", "explicit"], estimator="GLS")):
         best, worst = (pick(weighted, key=lambda row: row["ratio"]) for pick in (min, max))
         words[-1] += f"; with generalized least squares {interval(best)} to {interval(worst)} times"
@@ -115,6 +118,10 @@ def conclusion(found: Sequence[RatioRow]) -> str:
 
 def _of(found: Sequence[RatioRow], pair: list[str], **given: str) -> list[RatioRow]:
     return [row for row in found if row["models"] == pair and all(row[key] == x for key, x in given.items())]
+
+
+def _ripple(row: RatioRow) -> bool:
+    return bool(row["settings"].get("noise") == "ripple")
 
 
 def _span(rows: Sequence[RatioRow]) -> str:

@@ -8,6 +8,7 @@ from idbench.sim.trajectories.quintic import RandomMoves as RandomMoves
 from idbench.sim.trajectories.quintic import RandomPace as RandomPace
 from idbench.sim.trajectories.recorded import Recorded as Recorded
 from idbench.sim.trajectories.steps import RandomSteps as RandomSteps
+from idbench.sim.trajectories.time_optimal import RandomTimeOptimal as RandomTimeOptimal
 from idbench.sim.trajectories.time_optimal import TimeOptimal as TimeOptimal
 from idbench.sim.trajectories.trajectory import AbstractTrajectory as AbstractTrajectory
 from idbench.sim.trajectories.trajectory import Reference as Reference
@@ -20,6 +21,7 @@ TRAJECTORIES: PluginTable[AbstractTrajectory] = PluginTable(
         "pace": RandomPace,
         "quintic": Quintic,
         "random": RandomMoves,
+        "random_time_optimal": RandomTimeOptimal,
         "recorded": Recorded,
         "steps": RandomSteps,
         "time_optimal": TimeOptimal,

@@ -11,7 +11,7 @@ from idbench.sim.robot.motors import Array
 from idbench.sim.robot.robot import Robot
 from idbench.sim.settings import EachPositive, NotNegative, Positions, Positive, Seed, Whole, per_joint, settings
 from idbench.sim.trajectories.point_to_point import PEAK_VELOCITY, PointToPoint, at_rest
-from idbench.sim.trajectories.trajectory import AbstractTrajectory
+from idbench.sim.trajectories.trajectory import AbstractMotion, AbstractTrajectory
 
 
 @settings
@@ -127,13 +127,18 @@ class RandomMoves(AbstractTrajectory):
         if self.durations[0] > self.durations[1]:
             raise ScenarioError(f"durations = {list(self.durations)}: the shortest is above the longest")
 
-    def plan(self, robot: Robot) -> PointToPoint:
-        """Draw waypoints and times; every joint moves in every move."""
-        rng, ranges = np.random.default_rng(self.seed), room(robot)
+    def drawn(self, rng: np.random.Generator, robot: Robot) -> Array:
+        """Draw waypoints [rad], shape (moves + 1, joint)."""
+        ranges = room(robot)
         width = np.diff(ranges, axis=1)[:, 0]
         clearance = np.minimum(0.2, width / 10) if self.clearance is None else self.clearance
         smallest = np.minimum(0.4, width / 4) if self.smallest_move is None else self.smallest_move
-        points = draw_waypoints(rng, self.moves + 1, ranges, clearance, smallest)
+        return draw_waypoints(rng, self.moves + 1, ranges, clearance, smallest)
+
+    def plan(self, robot: Robot) -> AbstractMotion:
+        """Draw waypoints and times; every joint moves in every move."""
+        rng = np.random.default_rng(self.seed)
+        points = self.drawn(rng, robot)
         velocity = per_joint(self.velocity, robot.n, "trajectory.velocity")
         fastest = (PEAK_VELOCITY * np.abs(np.diff(points, axis=0)) / velocity).max(axis=1)
         return at_rest(points, np.maximum(rng.uniform(*self.durations, self.moves), fastest), self.rest)

@@ -10,7 +10,8 @@ from ruckig import InputParameter, Result, Ruckig, RuckigError, Trajectory
 from idbench.sim.errors import ScenarioError
 from idbench.sim.robot.motors import Array
 from idbench.sim.robot.robot import Robot
-from idbench.sim.settings import EachPositive, NotNegative, Positions, per_joint, settings
+from idbench.sim.settings import EachPositive, NotNegative, Positions, Positive, per_joint, settings
+from idbench.sim.trajectories.quintic import RandomMoves
 from idbench.sim.trajectories.trajectory import AbstractMotion, AbstractTrajectory, Reference, require_in_range
 
 
@@ -26,10 +27,11 @@ class JerkLimited(AbstractMotion):
     """Duration [s]."""
 
     @classmethod
-    def between(cls, points: Array, limits: Array, rest: float) -> Self:
+    def between(cls, points: Array, limits: Array, rest: float, shortest: Array | float = 0.0) -> Self:
         """Return the fastest moves from each of `points`, shape (w, joint), to the next, at rest in all of them.
 
-        `limits` are those of velocity, acceleration and jerk, shape (3, joint); `rest` [s] is spent at both ends.
+        `limits` are those of velocity, acceleration and jerk, shape (3, joint); `rest` [s] is spent at both ends, and every
+        move takes `shortest` [s], of all or each, or more.
 
         Raises
         ------
@@ -39,8 +41,9 @@ class JerkLimited(AbstractMotion):
         n, clock = points.shape[1], rest
         start = [np.zeros((n, 1))]
         states = [_standing(points[0])]
-        for before, after in pairwise(points):
-            move = _fastest(before, after, limits)
+        least = np.broadcast_to(shortest, len(points) - 1).tolist()
+        for (before, after), duration in zip(pairwise(points), least, strict=True):
+            move = _fastest(before, after, limits, duration)
             pieces = [_pieces(profile) for profile in move.profiles[0]]
             start.append(clock + np.array([t for t, _ in pieces]))
             states.append(np.array([x for _, x in pieces]))
@@ -87,16 +90,39 @@ class TimeOptimal(AbstractTrajectory):
 
     def plan(self, robot: Robot) -> JerkLimited:
         """Return ruckig's moves."""
-        n, points = len(self.waypoints[0]), np.array(self.waypoints)
-        names = ("velocity", "acceleration", "jerk")
-        limits = np.array([per_joint(getattr(self, name), n, f"trajectory.{name}") for name in names])
-        return JerkLimited.between(points, limits, self.rest)
+        points = np.array(self.waypoints)
+        return JerkLimited.between(points, _limits(self, points.shape[1]), self.rest)
 
 
-def _fastest(before: Array, after: Array, limits: Array) -> Trajectory:
+@settings
+class RandomTimeOptimal(RandomMoves):
+    """Moves between random waypoints, as fast as limits of velocity, acceleration and jerk allow (ruckig)."""
+
+    durations: tuple[NotNegative, Positive] = (0.0, 1e-3)
+    """Shortest times of moves [s], of which each draws one; a move that the limits make slower takes longer."""
+    acceleration: EachPositive = (18.0,)
+    """Largest acceleration [rad/s^2], of all joints or of each."""
+    jerk: EachPositive = (300.0,)
+    """Largest jerk [rad/s^3], of all joints or of each."""
+
+    def plan(self, robot: Robot) -> JerkLimited:
+        """Draw waypoints; return ruckig's moves."""
+        rng = np.random.default_rng(self.seed)
+        points = self.drawn(rng, robot)
+        shortest = rng.uniform(*self.durations, self.moves)
+        return JerkLimited.between(points, _limits(self, robot.n), self.rest, shortest)
+
+
+def _limits(asked: TimeOptimal | RandomTimeOptimal, n: int) -> Array:
+    names = ("velocity", "acceleration", "jerk")
+    return np.array([per_joint(getattr(asked, name), n, f"trajectory.{name}") for name in names])
+
+
+def _fastest(before: Array, after: Array, limits: Array, shortest: float) -> Trajectory:
     n = len(before)
     wanted, move = InputParameter(n), Trajectory(n)
     wanted.current_position, wanted.target_position = before.tolist(), after.tolist()
+    wanted.minimum_duration = shortest or None
     wanted.max_velocity, wanted.max_acceleration, wanted.max_jerk = limits.tolist()
     try:
         result = Ruckig(n).calculate(wanted, move)

@@ -7,8 +7,8 @@ import pytest
 
 from idbench.experiments.cli import main
 from idbench.experiments.errors import ExperimentError
-from idbench.experiments.paper.motions import COMPARED, Errors, Table1Motions
-from idbench.experiments.paper.table1 import PAPER
+from idbench.experiments.paper.motions import COMPARED, Errors, Table1Motions, relations
+from idbench.experiments.paper.table1 import PAPER, over_explicit
 from idbench.identify import IirLowPass, ReversalMask
 from idbench.identify.rows.chain import CHAINS
 from idbench.sim.trajectories import RandomPace
@@ -78,3 +78,18 @@ def test_the_command_writes_table_and_picture(tmp_path, capsys):
 def test_what_no_motion_has_is_told():
     with pytest.raises(ExperimentError, match=r"none of \d motions has the paper's condition numbers"):
         _ = Table1Motions(2, tolerance=1e-6).errors
+
+
+def test_relations_of_the_paper_are_those_that_it_prints():
+    """Geometric means of the ratios of the printed errors, the implicit ones by hand."""
+    found = over_explicit({model: column.error for model, column in PAPER.items()})
+    assert found["implicit"] == pytest.approx(
+        np.prod([1.05, 3.135, 1.375, 2.667, 5.143, 9.225, 2.042, 2.5]) ** (1 / 8), rel=1e-3
+    )
+    own = np.tile(PAPER["explicit"].error, (4, 1))
+    percent = {"explicit": own, "implicit": own * np.array([[3.0], [2.0], [3.0], [0.5]]), "power": own * 7.0}
+    of = relations(Errors(4, {}, percent))
+    assert of["implicit"]["reached"] == 0.5
+    assert of["implicit"]["all_larger"] == 0.75
+    assert of["implicit"]["median"] == pytest.approx(2.5)
+    assert of["power"] == pytest.approx({"paper": 6.888, "median": 7.0, "reached": 1.0, "all_larger": 1.0}, rel=1e-3)

@@ -1,0 +1,159 @@
+"""Tables and pictures of added rows of power, of ruckig's moves, of the smallest imperfections, and of the implicit column."""
+
+import json
+from collections.abc import Callable, Iterator, Sequence
+from math import log2
+from pathlib import Path
+from typing import Any
+
+from results import RESULTS, Cell, cells, table, typical
+
+NOISES = {
+    "none": "none",
+    "torque": "white torque noise",
+    "encoder": "14-bit encoder",
+    "ripple": "ripple, 16 bits",
+    "all": "all of them",
+    "friction": "Stribeck friction",
+}
+MOVES = {"fifth-order": "fifth-order", "ruckig": "ruckig", "ruckig-fastest": "ruckig, fastest"}
+PACES = {"slow": "2.6 s", "usual": "1.3 s", "fast": "0.8 s"}
+COLORS = {"explicit": "#2ca02c", "power": "#d62728"}
+SMALLEST = {
+    "smallest-ripple": ("ripple.cogging", "cogging, times the robot's"),
+    "smallest-count": ("encoder.lines", "encoder"),
+    "smallest-delay": ("delay", "delay that nobody states"),
+}
+
+
+def _by(study: str, *keys: str) -> dict[tuple[Any, ...], Cell]:
+    """Return cells by some of their settings, then chain, estimator and model."""
+    return {(*(c["settings"][key] for key in keys), c["chain"], c["estimator"], c["model"]): c for c in cells(study)}
+
+
+def _firsts(found: dict[tuple[Any, ...], Cell], place: int) -> list[Any]:
+    return list(dict.fromkeys(key[place] for key in found))
+
+
+def explicit_power() -> Iterator[str]:
+    """Yield typical errors [%] of the explicit model, without rows of power beside it and with them."""
+    found = _by("explicit-power", "noise")
+    estimators = _firsts(found, 2)
+
+    def rows() -> Iterator[Sequence[str]]:
+        for noise in _firsts(found, 0):
+            for chain in _firsts(found, 1):
+                pairs = ((found[noise, chain, e, m] for m in ("explicit", "explicit+power")) for e in estimators)
+                yield [NOISES[noise], chain, *(" → ".join(map(typical, pair)) for pair in pairs)]
+
+    yield from table(["noise", "chain", *estimators], rows())
+
+
+def moves() -> Iterator[str]:
+    """Yield typical errors [%] by motion: explicit and power in chain idbench by GLS, and in the paper's masked by OLS."""
+    found = _by("moves", "noise", "moves")
+    ways = [("idbench", "GLS", "explicit"), ("idbench", "GLS", "power"), ("paper_masked", "OLS", "explicit")]
+
+    def rows() -> Iterator[Sequence[str]]:
+        for noise in _firsts(found, 0):
+            for motion, name in MOVES.items():
+                yield [NOISES[noise], name, *(typical(found[noise, motion, *way]) for way in ways)]
+
+    yield from table(["imperfection", "moves", *(f"{m}, {chain}, {e}" for chain, e, m in ways)], rows())
+
+
+def smallest(study: str) -> Callable[[], Iterator[str]]:
+    """Return what makes the table of typical errors [%] over an imperfection, by model and pace."""
+    key, head = SMALLEST[study]
+
+    def made() -> Iterator[str]:
+        found = _by(study, key, "pace")
+        ways = [(pace, model) for model in ("explicit", "implicit", "power") for pace in PACES]
+        rows = (
+            [_value(x, key), *(typical(found[x, pace, "idbench", "GLS", model]) for pace, model in ways)]
+            for x in _firsts(found, 0)
+        )
+        yield from table([head, *(f"{model}, {PACES[pace]}" for pace, model in ways)], rows)
+
+    return made
+
+
+def _value(x: Any, key: str) -> str:
+    return f"{log2(4 * x):g} bits" if key == "encoder.lines" else x if isinstance(x, str) else f"{x:g}"
+
+
+def implicit_steps() -> Iterator[str]:
+    """Yield what changes of one step of the chain make of the implicit model's errors over the explicit one's."""
+    found = json.loads((RESULTS / "implicit-steps.json").read_text())
+    rows = (
+        [
+            row["step"],
+            f"{row['ratio']:.2g} ({row['low']:.2g} to {row['high']:.2g})",
+            f"{row['reached']:.0%}",
+            f"{row['all_larger']:.0%}",
+            f"{row['over_paper']:.2g}",
+        ]
+        for row in found
+    )
+    yield from table(["changed", "implicit / explicit", "2.7 or more", "all eight larger", "implicit / the paper's"], rows)
+
+
+def draw_smallest(place: Path) -> None:
+    """Draw typical errors over ripple, counts and delay, of two models and three paces."""
+    import numpy as np
+    from matplotlib.figure import Figure
+
+    import idbench.experiments.reports.drawn  # noqa: F401  # letters as in reports
+
+    figure = Figure(figsize=(11, 3.8), layout="constrained")
+    panels = figure.subplots(1, len(SMALLEST), sharey=True)
+    for panel, (study, (key, head)) in zip(panels, SMALLEST.items(), strict=True):
+        found = _by(study, key, "pace")
+        values = _firsts(found, 0)
+        at = np.arange(len(values))
+        for model, color in COLORS.items():
+            for pace, style in zip(PACES, (":", "-", "--"), strict=True):
+                y = [float(typical(found[x, pace, "idbench", "GLS", model])) for x in values]
+                panel.plot(at, y, style, color=color, marker="o", markersize=3, label=f"{model}, moves of {PACES[pace]}")
+        panel.set_yscale("log")
+        panel.set_xticks(at, [_value(x, key) for x in values], rotation=30)
+        panel.set_title(head, loc="left", fontsize=11)
+        panel.grid(axis="y", color="0.9")
+        panel.spines[["top", "right"]].set_visible(False)
+    panels[0].set_ylabel("typical error [%]")
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False, fontsize=9)
+    figure.savefig(place, dpi=110)
+
+
+def draw_moves(place: Path) -> None:
+    """Draw typical errors of fifth-order moves and of ruckig's, by imperfection."""
+    import numpy as np
+    from matplotlib.figure import Figure
+
+    import idbench.experiments.reports.drawn  # noqa: F401  # letters as in reports
+
+    found = _by("moves", "noise", "moves")
+    noises = _firsts(found, 0)
+    figure = Figure(figsize=(11, 3.8), layout="constrained")
+    ways = (("idbench", "GLS", "explicit"), ("idbench", "GLS", "power"), ("paper_masked", "OLS", "explicit"))
+    panels = figure.subplots(1, len(ways), sharey=True)
+    for panel, way in zip(panels, ways, strict=True):
+        for k, (motion, name) in enumerate(MOVES.items()):
+            y = [float(typical(found[noise, motion, *way])) for noise in noises]
+            panel.plot(np.arange(len(noises)) + 0.15 * (k - 1), y, "osD"[k], label=name)
+        panel.set_yscale("log")
+        panel.set_xticks(range(len(noises)), [NOISES[noise] for noise in noises], rotation=25, ha="right")
+        panel.set_title(f"{way[2]} model, chain {way[0]}, {way[1]}", loc="left", fontsize=11)
+        panel.grid(axis="y", color="0.9")
+        panel.spines[["top", "right"]].set_visible(False)
+    panels[0].set_ylabel("typical error [%]")
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False, fontsize=9)
+    figure.savefig(place, dpi=110)
+
+
+ANSWERS_TABLES: dict[str, Callable[[], Iterator[str]]] = {
+    "explicit-power": explicit_power,
+    "moves": moves,
+    "implicit-steps": implicit_steps,
+    **{study: smallest(study) for study in SMALLEST},
+}
