@@ -86,7 +86,6 @@ PICTURES = {
     "recording-saturation": Picture(("run saturation --out OUT",), "parameters"),
     "any-arm": Picture(("run arm --out OUT",), "", 0.4),
     "table1": Picture(("table1 --out OUT",), "", 0.6),
-    "table2": Picture(("table2 --out OUT",), "", 0.6),
     "recording-compare": Picture(("run quantization --out OUT/quantization", "run ripple --out OUT/ripple"), "compare"),
     "recording-excited": Picture(("excite panda --out OUT --force",), "", 0.55),
     "recording-servo": Picture(SERVO),

@@ -24,6 +24,8 @@ sys.path[:0] = [str(DOCS / "build"), str(DOCS.parent)]
 from conclusion_tables import keep_conclusion  # noqa: E402
 from results import RESULTS, keep, short  # noqa: E402
 
+from idbench.identify import Array  # noqa: E402
+
 MADE = RESULTS / "made.json"
 RUNS = 2  # Of a sample: its numbers are compared with those of the same runs, not with the truth
 ESTIMATORS, MODELS, LOGS = 2, 3, 2  # Of a sample, the first, of no more logs: others simulate for minutes
@@ -31,6 +33,8 @@ SOURCES = ("models", "sim", "identify", "experiments/study", "experiments/paper"
 
 FAR = 6.0
 """Typical error of two runs over that of many: ln|x| of a normal error scatters by 1.1, and parameters of a run go together."""
+
+ALIKE = 0.01  # Of numbers of the same runs: another machine may round an encoder's count the other way, now and then
 
 CAUSE = "cogging and commutation"  # Of Table 2, in its sample
 
@@ -40,6 +44,7 @@ STUDIES = sorted(path.stem for path in (DOCS.parent / "experiments" / "studies")
 OTHERS = {
     "table2": "idbench table2",
     "table1-motions": "idbench table1 --motions 2000",
+    "implicit-steps": "python tests/benchmarks/implicit_steps.py 100 docs/results/implicit-steps.json",
     "excitation-motions": "python docs/build/motions.py",
     "excitation-ranks": "python docs/build/motions.py",
     "reversals": "python tests/benchmarks/reversals.py 64 docs/results/reversals.json",
@@ -118,6 +123,17 @@ def apart(name: str, found: Mapping[str, list[float]]) -> tuple[str, float] | No
     return None
 
 
+def changed(kept: Mapping[str, list[float]], found: Mapping[str, list[float]]) -> list[str]:
+    """Return the samples that are not what is kept, to `ALIKE` of each number and of the typical one beside it."""
+    every = {label: (kept.get(label, []), found.get(label, [])) for label in {**kept, **found}}
+    return [label for label, (a, b) in every.items() if len(a) != len(b) or not _alike(np.array(a), np.array(b))]
+
+
+def _alike(a: Array, b: Array) -> bool:
+    limit = ALIKE * (np.abs(a) + np.median(np.abs(a)))
+    return bool((np.abs(a - b) <= limit).all())
+
+
 def _named(cell: Mapping[str, Any]) -> str:
     settings = (f"{key} {x}" for key, x in cell["settings"].items())
     return ", ".join([*settings, cell["chain"], cell["estimator"], cell["model"]])
@@ -160,8 +176,8 @@ def main(names: list[str], remade: Callable[[str], None] | None) -> None:
         if remade:
             remade(name)
         found = sample(name)
-        if kept.get(name, {}).get("sample", found) != found:
-            print(f"{name}: its sample has changed")
+        if others := changed(kept.get(name, {}).get("sample", found), found):
+            print(f"{name}: {len(others)} samples have changed, such as {others[0]}")
         kept[name] = {"command": commands()[name], "sources": sources, "sample": found}
         lines = (f" {json.dumps(key)}: {json.dumps(kept[key])}" for key in sorted(kept))
         MADE.write_text("{\n" + ",\n".join(lines) + "\n}\n")

@@ -74,7 +74,12 @@ Files = str | Path | Sequence[str | Path]
 
 
 def study(
-    name: str | Path | Study, *, seeds: int | None = None, out: str | Path | None = None, threads: int | None = None, **parts: Any
+    name: str | Path | Study,
+    *,
+    seeds: int | None = None,
+    out: str | Path | None = None,
+    threads: int | None = None,
+    **parts: Any,
 ) -> StudyTable:
     """Return a study that was run: errors and coverage of every combination.
 

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from collections.abc import Set as AbstractSet
-from math import isnan
 from pathlib import Path
 
 import numpy as np
@@ -16,9 +15,9 @@ from idbench.experiments.identification.logs import Logs
 from idbench.experiments.identification.method import Method
 from idbench.experiments.identification.request import Request
 from idbench.experiments.paper.table1 import Table1, table1_markdown
-from idbench.experiments.paper.table2 import PAPER, Table2
+from idbench.experiments.paper.table2 import Table2
 from idbench.experiments.recording.audience import Audience
-from idbench.experiments.recording.chart import NARROW, SYMBOLS, Chart, send_keys
+from idbench.experiments.recording.chart import send_keys
 from idbench.experiments.recording.compared import Compared, difference, differences, estimates, named_runs, shift_of
 from idbench.experiments.recording.folder import BASE, INNER, files
 from idbench.experiments.recording.identification_layer import Layer
@@ -26,10 +25,8 @@ from idbench.experiments.recording.identification_recording import RunRecording,
 from idbench.experiments.recording.lanes import about
 from idbench.experiments.recording.layouts import tabs
 from idbench.experiments.recording.motion_layer import Base
-from idbench.experiments.recording.scales import listed, signed
 from idbench.experiments.recording.stream import NANOSECONDS, SIZES, Stream, part, seconds
-from idbench.experiments.text import FORM_WIDTHS, FORMS, GREY, joint_colors, lighter, markdown, model_color, with_unit
-from idbench.identify import scara
+from idbench.experiments.text import FORM_WIDTHS, FORMS, GREY, joint_colors, lighter, model_color
 from idbench.sim.scenario.scenario_file import to_toml
 
 
@@ -51,59 +48,11 @@ def record_table1(table: Table1, audience: Audience | None = None) -> list[tuple
     return streams
 
 
-BEND = 0.01  # Error [%] up to which axes are linear
-NOUGHT = 0.005  # Error [%] below which there is none at two decimals
-NOTABLE = 1.0  # Error [%] from which on it is written in bold
-
-
 def finish_table2(recording: RunRecording, table: Table2) -> list[tuple[str, Stream]]:
     """Add what only the end of a run gives to the first realization's recording; return its streams by file name."""
-    run, stream = table.run, recording.base.stream
-    streams = recording.end(run)
-    _send_processings(stream, table)
-    for form in next(iter(table.attribution.values())):
-        rows = ([cause, *map(_emphasized, errors[form])] for cause, errors in table.attribution.items())
-        title = f"Error [%] of each parameter by each cause alone, **{form}** model"
-        stream.page(f"attribution/{form}", markdown(title, list(table.truth), rows))
-    stream.page("table2", _markdown(table))
+    streams = recording.end(table.run)
     recording.base.finish(about(table.scenario.name, table.scenario.origin))
     return streams
-
-
-def _send_processings(stream: Stream, table: Table2) -> None:
-    """Send the error of every parameter by both processings, on one scale."""
-    truth, names = list(table.truth.values()), list(table.truth)
-    errors = {
-        name: {form: one.estimates[form].error_percent(truth) for form, one in found.items()}
-        for name, found in table.found.items()
-    }
-    x = signed("error [%]", *(error for found in errors.values() for error in found.values()), bend=BEND)
-    for name, found in errors.items():
-        chart = Chart(stream, f"processing/{name}", x, listed("", names), NARROW)
-        for symbol, (form, error) in zip(SYMBOLS, found.items(), strict=False):
-            chart.marks(form, error, np.arange(float(len(names))), FORMS[form], symbol)
-            chart.list_entry(form, FORMS[form])
-
-
-def _emphasized(error_percent: float) -> str:
-    if isnan(error_percent):
-        return ""
-    if abs(error_percent) < NOUGHT:
-        return "0"
-    shown = f"{error_percent:+.2f}" if abs(error_percent) < 100 else f"{error_percent:+.0f}"
-    return f"**{shown}**" if abs(error_percent) > NOTABLE else shown
-
-
-def _markdown(table: Table2) -> str:
-    """Return the explicit and the power model's estimates beside the paper's."""
-    units = scara().units
-    lines = ["| | true | | paper | paper's steps | idbench |", "|---|---:|---|---:|---:|---:|"]
-    for i, (name, true) in enumerate(table.truth.items()):
-        for form in ("explicit", "power"):
-            X = [found[form].estimates[form].X[i] for found in table.found.values()]
-            head = f"{with_unit(name, units[i])} | {true:g}" if form == "explicit" else " | "
-            lines.append(f"| {head} | {form} | {PAPER[form].estimate[i]:g} | {' | '.join(f'{x:.4g}' for x in X)} |")
-    return "\n".join(lines)
 
 
 SIGNALS = ("q/measured", "qd/true", "torque/log")  # Of the second run and of those after it, what is laid over the first one's

@@ -28,19 +28,6 @@ FEW = 2  # Parameters of a study up to which two stand in a row
 PAGE = 8  # Parameters of a study that are seen at once
 
 
-def table2(shelf: Shelf) -> Part:
-    """Return Table 2: the virtual robot's errors by both processings, and what each imperfection does alone."""
-    if (causes := text(shelf, "attribution/*")) is None:
-        return None
-    found = charts(shelf, "error [%], {1}'s steps", "processing/*", NARROW)
-    signals = column(
-        plot(shelf, "torque [N m], logged", "torque/log"),
-        plot(shelf, "true - commanded [N m]", "torque/disturbance"),
-    )
-    left = column(side_by_side("twin", arm(shelf), signals, shares=[2, 3]), text(shelf, "table2"), shares=[3, 5])
-    return side_by_side("table2", left, column(*found), causes, shares=[7, 4, 7])
-
-
 def compare(shelf: Shelf) -> Part:
     """Return several runs over each other: what differs in them, how they move, and the differences."""
     if not shelf.of("comparison"):
@@ -106,7 +93,7 @@ def _over_axis(shelf: Shelf, axis: str) -> Part:
     return column(*typical, shown, shares=[2, 3], name=axis)
 
 
-LAYOUTS: tuple[Callable[[Shelf], Part], ...] = (study, table2, compare, excited, servos, *RUN_LAYOUTS)
+LAYOUTS: tuple[Callable[[Shelf], Part], ...] = (study, compare, excited, servos, *RUN_LAYOUTS)
 """Layouts, named after what they are for; a recording opens with the first for which it has something to show."""
 
 

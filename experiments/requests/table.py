@@ -8,16 +8,14 @@ from typing import Any, TypeVar
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from idbench.experiments.errors import ExperimentError
-from idbench.experiments.requests.words import plain_of, request_keys, word_of
+from idbench.experiments.requests.words import plain_of, request_keys
 from idbench.identify.plugins import did_you_mean
 
 Request = TypeVar("Request")
 
 
-def request_from(
-    request: type[Request], table: Mapping[str, Any], where: str, folder: Path | None = None, taken: Container[str] = ()
-) -> Request:
-    """Return a request with the values of a table, which messages call `where`, and whose files are in a folder.
+def request_from(request: type[Request], table: Mapping[str, Any], where: str, taken: Container[str] = ()) -> Request:
+    """Return a request with the values of a table, which messages call `where`.
 
     Keys that are `taken` are none of the table.
 
@@ -32,7 +30,7 @@ def request_from(
         if key not in known:
             raise ExperimentError(f"{where}: unknown key {key!r}{did_you_mean(key, known)}; known: {', '.join(known)}")
         place, hint = known[key]
-        checked = _in_folder(_checked(f"{where}: {key}", hint, value), hint, folder)
+        checked = _checked(f"{where}: {key}", hint, value)
         (groups.setdefault(place[0], {}) if len(place) > 1 else values)[place[-1]] = checked
     defaults = {f.name: f.default for f in fields(request)}  # type: ignore[arg-type]  # a dataclass
     return request(**values, **{name: replace(defaults[name], **inner) for name, inner in groups.items()})  # type: ignore[type-var]
@@ -62,14 +60,3 @@ def _checked(where: str, hint: Any, value: Any) -> Any:
         detail = error.errors(include_url=False)[0]
         said = str(detail["msg"]).replace("Input should be", "must be")
         raise ExperimentError(f"{where} = {detail['input']!r:.60}: {said}") from None
-
-
-def _in_folder(value: Any, hint: Any, folder: Path | None) -> Any:
-    """Return a file's name from the folder of the table; names of what ships stay."""
-    if folder is None or not word_of(hint).file:
-        return value
-    if isinstance(value, tuple):
-        return tuple(_in_folder(each, hint, folder) for each in value)
-    if isinstance(value, Path):
-        return folder / value
-    return str(folder / value) if value and Path(value).suffix else value

@@ -11,7 +11,7 @@ from idbench.sim.robot.motors import Array
 from idbench.sim.robot.robot import Robot
 from idbench.sim.settings import EachPositive, NotNegative, Positions, Positive, Seed, Whole, per_joint, settings
 from idbench.sim.trajectories.point_to_point import PEAK_VELOCITY, PointToPoint, at_rest
-from idbench.sim.trajectories.trajectory import AbstractMotion, AbstractTrajectory
+from idbench.sim.trajectories.trajectory import AbstractTrajectory
 
 
 @settings
@@ -105,13 +105,11 @@ def draw_waypoints(
 
 
 @settings
-class RandomMoves(AbstractTrajectory):
-    """Fifth-order moves between random waypoints in random times."""
+class AbstractRandomMoves(AbstractTrajectory):
+    """Moves between random waypoints."""
 
     moves: Annotated[Whole, Field(ge=1, le=100000)] = 30
     """Number of moves."""
-    durations: tuple[Positive, Positive] = (1.1, 1.55)
-    """Shortest and longest time of a move [s]; those between are equally likely."""
     velocity: EachPositive = (7.0,)
     """Largest speed [rad/s], of all joints or of each; a move that would be faster takes longer."""
     rest: NotNegative = 3.0
@@ -123,20 +121,28 @@ class RandomMoves(AbstractTrajectory):
     seed: Seed = 0
     """The same seed gives the same waypoints."""
 
-    def __post_init__(self) -> None:
-        if self.durations[0] > self.durations[1]:
-            raise ScenarioError(f"durations = {list(self.durations)}: the shortest is above the longest")
-
     def drawn(self, rng: np.random.Generator, robot: Robot) -> Array:
-        """Draw waypoints [rad], shape (moves + 1, joint)."""
+        """Draw waypoints [rad], shape (moves + 1, joint); every joint moves in every move."""
         ranges = room(robot)
         width = np.diff(ranges, axis=1)[:, 0]
         clearance = np.minimum(0.2, width / 10) if self.clearance is None else self.clearance
         smallest = np.minimum(0.4, width / 4) if self.smallest_move is None else self.smallest_move
         return draw_waypoints(rng, self.moves + 1, ranges, clearance, smallest)
 
-    def plan(self, robot: Robot) -> AbstractMotion:
-        """Draw waypoints and times; every joint moves in every move."""
+
+@settings
+class RandomMoves(AbstractRandomMoves):
+    """Fifth-order moves between random waypoints in random times."""
+
+    durations: tuple[Positive, Positive] = (1.1, 1.55)
+    """Shortest and longest time of a move [s]; those between are equally likely."""
+
+    def __post_init__(self) -> None:
+        if self.durations[0] > self.durations[1]:
+            raise ScenarioError(f"durations = {list(self.durations)}: the shortest is above the longest")
+
+    def plan(self, robot: Robot) -> PointToPoint:
+        """Draw waypoints and times."""
         rng = np.random.default_rng(self.seed)
         points = self.drawn(rng, robot)
         velocity = per_joint(self.velocity, robot.n, "trajectory.velocity")

@@ -10,8 +10,8 @@ from ruckig import InputParameter, Result, Ruckig, RuckigError, Trajectory
 from idbench.sim.errors import ScenarioError
 from idbench.sim.robot.motors import Array
 from idbench.sim.robot.robot import Robot
-from idbench.sim.settings import EachPositive, NotNegative, Positions, Positive, per_joint, settings
-from idbench.sim.trajectories.quintic import RandomMoves
+from idbench.sim.settings import EachPositive, NotNegative, Positions, per_joint, settings
+from idbench.sim.trajectories.quintic import AbstractRandomMoves
 from idbench.sim.trajectories.trajectory import AbstractMotion, AbstractTrajectory, Reference, require_in_range
 
 
@@ -27,11 +27,11 @@ class JerkLimited(AbstractMotion):
     """Duration [s]."""
 
     @classmethod
-    def between(cls, points: Array, limits: Array, rest: float, shortest: Array | float = 0.0) -> Self:
+    def between(cls, points: Array, limits: Array, rest: float, shortest: float = 0.0) -> Self:
         """Return the fastest moves from each of `points`, shape (w, joint), to the next, at rest in all of them.
 
         `limits` are those of velocity, acceleration and jerk, shape (3, joint); `rest` [s] is spent at both ends, and every
-        move takes `shortest` [s], of all or each, or more.
+        move takes `shortest` [s] or more.
 
         Raises
         ------
@@ -41,9 +41,8 @@ class JerkLimited(AbstractMotion):
         n, clock = points.shape[1], rest
         start = [np.zeros((n, 1))]
         states = [_standing(points[0])]
-        least = np.broadcast_to(shortest, len(points) - 1).tolist()
-        for (before, after), duration in zip(pairwise(points), least, strict=True):
-            move = _fastest(before, after, limits, duration)
+        for before, after in pairwise(points):
+            move = _fastest(before, after, limits, shortest)
             pieces = [_pieces(profile) for profile in move.profiles[0]]
             start.append(clock + np.array([t for t, _ in pieces]))
             states.append(np.array([x for _, x in pieces]))
@@ -95,11 +94,11 @@ class TimeOptimal(AbstractTrajectory):
 
 
 @settings
-class RandomTimeOptimal(RandomMoves):
+class RandomTimeOptimal(AbstractRandomMoves):
     """Moves between random waypoints, as fast as limits of velocity, acceleration and jerk allow (ruckig)."""
 
-    durations: tuple[NotNegative, Positive] = (0.0, 1e-3)
-    """Shortest times of moves [s], of which each draws one; a move that the limits make slower takes longer."""
+    duration: NotNegative = 0.0
+    """Least time of a move [s]; a move that the limits make slower takes longer."""
     acceleration: EachPositive = (18.0,)
     """Largest acceleration [rad/s^2], of all joints or of each."""
     jerk: EachPositive = (300.0,)
@@ -107,10 +106,8 @@ class RandomTimeOptimal(RandomMoves):
 
     def plan(self, robot: Robot) -> JerkLimited:
         """Draw waypoints; return ruckig's moves."""
-        rng = np.random.default_rng(self.seed)
-        points = self.drawn(rng, robot)
-        shortest = rng.uniform(*self.durations, self.moves)
-        return JerkLimited.between(points, _limits(self, robot.n), self.rest, shortest)
+        points = self.drawn(np.random.default_rng(self.seed), robot)
+        return JerkLimited.between(points, _limits(self, robot.n), self.rest, self.duration)
 
 
 def _limits(asked: TimeOptimal | RandomTimeOptimal, n: int) -> Array:

@@ -36,6 +36,7 @@ from idbench.experiments.judgement.held_out import WORDS, HeldOut
 from idbench.experiments.judgement.judgement import Unjudged, judge
 from idbench.experiments.requests.jobs import IdentifyRequest, ServoRequest
 from idbench.experiments.requests.table import request_from
+from idbench.experiments.requests.words import request_keys, word_of
 from idbench.experiments.results.writing import finite, write_summary
 from idbench.experiments.servo.identification import Servos, summary_of
 from idbench.experiments.servo.job import servos_identified
@@ -136,9 +137,20 @@ def _keys(log: MotionLog | LogColumns) -> npt.NDArray[np.void]:
 def request_in(folder: Path, definition: Definition) -> IdentifyRequest | ServoRequest:
     """What a set asks for; ExperimentError if a key is unknown, or a value wrong."""
     job, kind = ("identify", IdentifyRequest) if definition.servo is None else ("servo", ServoRequest)
-    asked = request_from(kind, definition.identify or definition.servo or {}, f"{folder / FILE}, [{job}]", folder, TAKEN)
+    table, keys = definition.identify or definition.servo or {}, request_keys(kind)
+    placed = {
+        key: _in_folder(folder, value) if key in keys and word_of(keys[key][1]).file else value for key, value in table.items()
+    }
+    asked = request_from(kind, placed, f"{folder / FILE}, [{job}]", TAKEN)
     fitted, held_out = (tuple(folder / name for name in names) for names in (definition.fit, definition.held_out))
     return replace(asked, log=fitted, validate=held_out)
+
+
+def _in_folder(folder: Path, value: Any) -> Any:
+    """Return a file's name from the folder of the table; names of what ships stay."""
+    if isinstance(value, list):
+        return [_in_folder(folder, each) for each in value]
+    return str(folder / value) if isinstance(value, str) and Path(value).suffix else value
 
 
 class SetFit(NamedTuple):

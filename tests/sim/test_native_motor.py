@@ -51,7 +51,7 @@ def off(run, h):
 
 
 def test_mujocos_own_motors_come_to_the_averaged_drive_as_their_step_falls(run):
-    """Their current is half a step late: differences of 0.5 mrad at a step of half the loop's 1 / w = 0.16 ms, none at h = 0."""
+    """Their current is half a step late: 0.5 mrad of difference at a step of half the loop's 1 / w, none at h = 0."""
     errors = [off(run, h) for h in (8e-5, 4e-5, 2e-5)]
     for wide, narrow in pairwise(errors):
         assert 1.9 < wide / narrow < 2.1
