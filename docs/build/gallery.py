@@ -52,7 +52,7 @@ FAULTS = {
     "offset": "The residual is a constant, between moves, too.",
     "delay": "The residual has spikes where the torque changes fast.",
     "position-delay": "The residual repeats the torque's slope, of inertia and friction alike.",
-    "zero": "The residual repeats gravity, a quarter of a turn late.",
+    "zero": "Nothing: the first moments of the last link turn with its zero.",
     "scale": "The residual grows with the distance from the zero.",
     "eccentric": "The residual is a wave over the position, once a turn.",
     "spring": "The residual is proportional to the position.",
@@ -70,7 +70,7 @@ FAULTS = {
     "base-motion": "The residuals of all joints oscillate together, also at rest.",
     "rate": "The residual repeats the inertia's torque.",
     "length": "The residuals appear where both joints move.",
-    "axis": "The residuals appear where gravity has a part along the turned axis.",
+    "axis": "The residual is small and slow: what gravity has along the turned axis.",
     "dropouts": "The velocity has notches, and the residual spikes at them.",
 }
 """Faults of the study, and what there is to see in their residuals."""
@@ -111,7 +111,10 @@ def photographed(name: str, client: object) -> None:
     place = Path(name).absolute()
     take(client, out, Picture((), "" if tab == "overview" else tab, 0.4), place)
     picture = Image.open(place.with_suffix(".png")).convert("RGB")
-    small = picture.resize((WIDTH, round(WIDTH * picture.height / picture.width)))
+    if name.startswith(OF_FAULT):  # torques of the joints, measured and predicted, and residuals
+        picture = picture.crop((round(0.555 * picture.width), 0, picture.width, picture.height - 30))
+    width = min(WIDTH, picture.width)
+    small = picture.resize((width, round(width * picture.height / picture.width)))
     small.save(PLACE / f"{name}.webp", quality=70)
 
 
@@ -120,7 +123,8 @@ def page() -> str:
     lines = [f"# {TITLE}\n"]
     lines.append(
         "Each picture is the recording of a run, each quotation what the run prints. `uv run python docs/build/gallery.py` "
-        "makes this page. Three recordings open [in the page](#three-recordings).\n"
+        "makes this page. Where the quotation names something else, or nothing, the doctor does not see the fault at this "
+        "size. Three recordings open [in the page](#three-recordings).\n"
     )
     lines.append("## Scenarios\n\n`uv run idbench run NAME`, then `uv run idbench view runs/NAME`.\n")
     lines += [_figure(name, see, f"run {name}") for name, (_, see) in SCENARIOS.items()]
@@ -141,8 +145,9 @@ def _line(case: dict[str, object]) -> str:
 
 def _figure(name: str, see: str, command: str) -> str:
     said = json.loads((PLACE / f"{name}.json").read_text())
-    quoted = f" *{said[0]}*" if said else " *No cause is named.*"
-    return f"### {name.removeprefix(OF_FAULT)}\n\n![{see}](gallery/{name}.webp)\n\n{see} `{command}`:{quoted}\n"
+    quoted = f" *{said[0].partition(';')[0]}*" if said else ""
+    what = name.removeprefix(OF_FAULT)
+    return f"### {what}\n\n![{what}](gallery/{name}.webp)\n\n`{command}`. {see}{quoted}\n"
 
 
 def write() -> None:

@@ -38,7 +38,7 @@ def bam_of(fit: ServoFit, model: str) -> tuple[str, list[str]]:
         )
     found = {name: float(p[letter]) for name, letter in BAM.items() if np.isfinite(p[letter])}
     motor = {"kt": p["b"] / p["a"], "R": p["b"] / p["a"] ** 2, "error_gain_ratio": 1 + p["gain_error"]}
-    named = {"model": laws[fit.friction], "actuator": _actuator(model)}
+    named = {"model": laws[fit.friction], "actuator": model.lower().replace("-", "")}
     lost = [x for x in fit.p if x not in ("a", "b", "gain_error", "offset", *BAM.values()) and fit.p[x]]
     return json.dumps(named | motor | found | NONE, indent=1, allow_nan=False) + "\n", lost
 
@@ -50,7 +50,10 @@ def device_of_bam(path: Path) -> dict[str, Any]:
         motor = {name: float(given[name]) for name in ("kt", "R", "armature")}
         require_positive(**motor)
         values = {letter: float(given[name]) for name, letter in BAM.items() if given.get(name) is not None}
-        law, published = LAWS[given["model"]], {_actuator(name): name for name in PUBLISHED}.get(given["actuator"])
+        law, published = (
+            LAWS[given["model"]],
+            {name.lower().replace("-", ""): name for name in PUBLISHED}.get(given["actuator"]),
+        )
         ratio = float(given.get("error_gain_ratio", 1.0))
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         wrong = f"it has no {error}" if isinstance(error, KeyError) else error
@@ -68,10 +71,6 @@ def device_of_bam(path: Path) -> dict[str, Any]:
     known = {"model": published} if published else {}
     about = f"{path}, BAM {given['model']} of {given['actuator']}"
     return {"name": path.stem, "source": about, "known": known, "friction": law, "parameters": of, "beyond": beyond}
-
-
-def _actuator(model: str) -> str:
-    return model.lower().replace("-", "")
 
 
 def require_drive(device: Mapping[str, Any]) -> None:

@@ -86,7 +86,9 @@ def friction_bias(to_rows: RowMap, linear: Linearization, model: AbstractModel, 
     """
     signals = to_rows.signals
     speed = rectified(smoothed(signals.state.qd, signals.fs), position[..., None] * signals.gain)
-    columns = model.c(linear.basis, replace(signals.state, qd=speed))
+    powers = {row for (row, _), B in to_rows.B.items() if not isinstance(B, float)}
+    every = model.c(linear.basis, replace(signals.state, qd=speed))
+    columns = {(row, place): column for (row, place), column in every.items() if row in powers}
     return to_rows.measurement(combined(columns, linear.X, np.zeros(to_rows.inside.shape)))
 
 

@@ -255,7 +255,7 @@ def _tilted(x: _Joint, model: Any) -> None:
 
 
 def _shaken(x: _Joint, model: Any) -> None:
-    model.opt.gravity[:] += x.size * _across(model)
+    model.opt.gravity[:] += x.size * np.cross(_across(model), model.opt.gravity / np.linalg.norm(model.opt.gravity))
 
 
 def _weightless(x: _Joint, model: Any) -> None:

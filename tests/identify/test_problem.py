@@ -9,6 +9,7 @@ import scipy
 
 from idbench.identify import (
     ESTIMATORS,
+    MODELS,
     AbstractEstimator,
     Armature,
     Basis,
@@ -91,3 +92,21 @@ def test_an_estimator_that_needs_rows_is_refused_a_log_too_long_for_them(log, mo
     with pytest.raises(IdentificationError, match="IRLS needs rows, and the rows of 4600 samples"):
         estimate(problem, ESTIMATORS.create("IRLS"))
     assert np.isfinite(estimate(problem, WeightedLeastSquares()).calibrated_sigma).all()
+
+
+def test_rows_of_power_stand_below_those_of_the_explicit_model(log):
+    """At every instant the n torques of the one, then the power of the other."""
+    problem = Problem((log,), scara(), ExplicitModel(), idbench_chain())
+    explicit, power, both = (problem.with_model(MODELS.create(name)).rows for name in ("explicit", "power", "explicit+power"))
+    assert both.kinds == 3
+    for name in ("Y", "W"):
+        own = getattr(both, name).reshape(-1, 3, *getattr(both, name).shape[1:])
+        np.testing.assert_allclose(own[:, :2].reshape(getattr(explicit, name).shape), getattr(explicit, name))
+        np.testing.assert_allclose(own[:, 2], getattr(power, name))
+    found = estimate(problem.with_model(MODELS.create("explicit+power")), WeightedLeastSquares())
+    alone = estimate(problem, WeightedLeastSquares())
+    off = (found.X - alone.X) / alone.standard_errors
+    assert np.abs(off).max() < 1  # rows of the same noise
+    share = found.standard_errors / alone.standard_errors
+    assert (share > 0.5).all()
+    assert (share < 1.3).all()  # friction is squared in the row of power alone

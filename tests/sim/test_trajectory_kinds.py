@@ -8,7 +8,7 @@ import pytest
 
 from idbench.sim.errors import ScenarioError
 from idbench.sim.robot.robot import Robot
-from idbench.sim.trajectories import TRAJECTORIES, Fourier, RandomMoves, TimeOptimal
+from idbench.sim.trajectories import TRAJECTORIES, Fourier, RandomMoves, RandomTimeOptimal, TimeOptimal
 
 POINTS = ((0.0, 0.0), (1.5, -1.0), (1.4, 1.0), (-1.0, 0.9))
 FAST = TimeOptimal(POINTS, velocity=(4.0, 5.0), acceleration=(15.0, 20.0), jerk=(200.0, 300.0), rest=0.5)
@@ -34,6 +34,21 @@ def test_it_rests_at_its_waypoints(robot):
     motion = FAST.plan(robot)
     ends = motion.at(np.array([0.0, 0.4, motion.duration - 0.4, motion.duration + 1.0]), 1.0)
     np.testing.assert_allclose(ends.q, [POINTS[0]] * 2 + [POINTS[-1]] * 2, atol=1e-9)
+
+
+def test_random_jerk_limited_moves_go_between_the_points_of_fifth_order_ones_within_limits(robot):
+    """The same seed draws the same points; with a least time each move takes as long, or longer where its limits ask for it."""
+    timed = RandomTimeOptimal(moves=6, acceleration=(10.0,), jerk=(200.0,), duration=1.3, rest=0.5, seed=4)
+    fifth = RandomMoves(moves=6, durations=(1.3, 1.3), rest=0.5, seed=4)
+    motion, other = timed.plan(robot), fifth.plan(robot)
+    assert motion.duration == pytest.approx(other.duration)
+    edges = 0.5 + 1.3 * np.arange(7)
+    np.testing.assert_allclose(motion.at(edges, 1.0).q, other.at(edges, 1.0).q, atol=1e-9)
+    fast = replace(timed, duration=0.0).plan(robot)
+    assert fast.duration < motion.duration
+    reference = fast.at(np.arange(0, fast.duration, 1e-3), 1e3)
+    assert np.abs(reference.qdd).max() == pytest.approx(10.0)
+    assert np.abs(reference.qd).max() <= 7.0 + 1e-9
 
 
 SERIES = Fourier(period=4.0, middle=(0.1, 0.2), sines=((0.3, 0.2), (0.1, -0.1)), cosines=((0.0, 0.1), (0.2, 0.0)), fade=1.0)
