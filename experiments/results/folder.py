@@ -1,7 +1,6 @@
 """The folder of an experiment's results: held while it is written, complete or absent, and never somebody else's."""
 
 import json
-import os
 from collections.abc import Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
@@ -9,13 +8,9 @@ from fnmatch import fnmatch
 from pathlib import Path
 
 from idbench.experiments.errors import REPORT, ResultsError
-from idbench.experiments.results.writing import NAME, Manifest, Read, WrittenFile, digest, exchange, hidden_folder
+from idbench.experiments.results.writing import NAME, Manifest, Read, WrittenFile, digest, exchange, hidden_folder, locked
 
-try:
-    import fcntl
-except ImportError:  # not on Windows, where two processes in one folder are noticed at the exchange of files alone
-    fcntl = None  # type: ignore[assignment]
-
+BUSY = "wait for it, or choose another --out"
 RECORDING = "recording.rrd"  # The recording to which identifications add their layers
 
 COMMON = ("summary.json", RECORDING, "recording.*.rrd", "log*.parquet", REPORT)
@@ -91,32 +86,12 @@ class ResultsFolder:
         with self._writing():
             self.out.mkdir(parents=True, exist_ok=True)
         try:
-            with self._locked():
+            with locked(self.out, ResultsError(f"another process is writing its results to {self.out}: {BUSY}")):
                 yield
         finally:
             for folder in made:  # where nothing came into them
                 with suppress(OSError):
                     folder.rmdir()
-
-    @contextmanager
-    def _locked(self) -> Iterator[None]:
-        """Hold the folder against other processes; raise ResultsError if one of them holds it."""
-        if fcntl is None:
-            yield
-            return
-        with self._writing():
-            held = os.open(self.out, os.O_RDONLY)
-        try:
-            try:
-                fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError:
-                message = f"another process is writing its results to {self.out}: wait for it, or choose another --out"
-                raise ResultsError(message) from None
-            except OSError:  # a file system without locks: the exchange of files looks once more
-                pass
-            yield
-        finally:
-            os.close(held)
 
     def complete(self) -> AbstractContextManager[Path]:
         """Give a hidden folder to write results to; on success they take the place of all earlier ones, summary.json last.

@@ -6,7 +6,7 @@ import os
 import socket
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from filecmp import cmp
 from importlib.metadata import version
@@ -17,8 +17,31 @@ from typing import Any, Self
 
 import numpy as np
 
-from idbench.experiments.errors import ResultsError, shortened
+from idbench.experiments.errors import ExperimentError, ResultsError, shortened
 from idbench.identify import Estimate
+
+try:
+    import fcntl
+except ImportError:  # not on Windows, where two processes in one folder are noticed at the exchange of files alone
+    fcntl = None  # type: ignore[assignment]
+
+
+@contextmanager
+def locked(folder: Path, busy: ExperimentError) -> Iterator[None]:
+    """Hold a folder against other processes; raise `busy` if one of them holds it."""
+    if fcntl is None:
+        yield
+        return
+    held = os.open(folder, os.O_RDONLY)
+    try:
+        with suppress(OSError):  # a file system without locks: the exchange of files looks once more
+            try:
+                fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                raise busy from None
+        yield
+    finally:
+        os.close(held)
 
 
 def write_summary(path: Path, summary: dict[str, Any]) -> None:

@@ -16,7 +16,7 @@ import pyarrow.parquet as pq
 import tomli_w
 
 from idbench.experiments.errors import ResultsError, StudyError
-from idbench.experiments.results.writing import replace_own
+from idbench.experiments.results.writing import locked, replace_own
 from idbench.experiments.study.cluster import require_versions, versions
 from idbench.experiments.study.shard import Shard, parts_of
 from idbench.experiments.study.statistics import NAMED
@@ -95,12 +95,6 @@ def _schema(study: Study) -> pa.Schema:
     return pa.schema(fields + [pa.field(name + part, pa.float64()) for name in study.parameters for part in parts_of(study)])
 
 
-try:
-    import fcntl
-except ImportError:  # not on Windows, where two processes in one folder are not noticed
-    fcntl = None  # type: ignore[assignment]
-
-
 @dataclass(frozen=True)
 class Store:
     """A study and its folder."""
@@ -146,15 +140,10 @@ class Store:
         """
         try:
             (self.folder / "shards").mkdir(parents=True, exist_ok=True)
-            lock = (self.folder / ".lock").open("w")
         except OSError as error:
             raise ResultsError(f"cannot write to {self.folder}: {error.strerror}; choose another --out") from error
-        with lock:
-            try:
-                if fcntl is not None:
-                    fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except OSError:
-                raise StudyError(f"another process is running the study in {self.folder}: wait for it, or stop it") from None
+        busy = StudyError(f"another process is running the study in {self.folder}: wait for it, or stop it")
+        with locked(self.folder, busy):
             if (self.folder / "study.toml").exists():
                 self._require_same()
             else:
