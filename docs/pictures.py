@@ -69,9 +69,6 @@ SERVO = ("run servo --out bench --no-rerun", f"servo bench/log.parquet {KNOWN} -
 BAR = 0.04
 """Height of the viewer's own bar, as a share of a picture."""
 
-MILLISECONDS = 120
-"""Time of a frame [ms]."""
-
 PICTURES = {
     "delay": Movie(DELAY, "", 0.3, until=0.42),
     "recording-overview": Picture(("run quantization --out OUT",)),
@@ -113,6 +110,7 @@ CHARTS = {
     "faults": "fault_tables.picture",
     "smallest": "answers_tables.draw_smallest",
     "moves": "answers_tables.draw_moves",
+    "table1-motions": "answers_tables.draw_motions",
 }
 """Pictures that are drawn from the figures in docs/results, and what draws them in docs/build."""
 
@@ -220,9 +218,7 @@ def take(client, out: Path, picture: Picture, path: Path) -> None:  # type: igno
         shares = np.linspace(picture.at, picture.until, picture.frames)
         frames = [_still(client, span, share, 15 if share == picture.at else 1) for share in shares]
         small = [frame.resize((1120, round(1120 * frame.height / frame.width))) for frame in frames]
-        small[0].save(
-            path.with_suffix(".webp"), save_all=True, append_images=small[1:], duration=MILLISECONDS, loop=0, quality=60
-        )
+        small[0].save(path.with_suffix(".webp"), save_all=True, append_images=small[1:], duration=120, loop=0, quality=60)
     else:
         image = _still(client, span, picture.at, 15)
         image.quantize(256, kmeans=1).save(path.with_suffix(".png"), optimize=True)

@@ -18,6 +18,7 @@ NOISES = {
 }
 MOVES = {"fifth-order": "fifth-order", "ruckig": "ruckig", "ruckig-fastest": "ruckig, fastest"}
 PACES = {"slow": "2.6 s", "usual": "1.3 s", "fast": "0.8 s"}
+CHAINS = {"paper": ("#b5651d", "the paper's steps"), "paper_masked": ("#2f6f9f", "the same, reversals left out")}
 COLORS = {"explicit": "#2ca02c", "power": "#d62728"}
 SMALLEST = {
     "smallest-ripple": ("ripple.cogging", "cogging, times the robot's"),
@@ -98,6 +99,25 @@ def implicit_steps() -> Iterator[str]:
     yield from table(["changed", "implicit / explicit", "2.7 or more", "all eight larger", "implicit / the paper's"], rows)
 
 
+def table1_motions() -> Iterator[str]:
+    """Yield the paper's errors [%] of two models, and medians of random motions in two chains."""
+    found = json.loads((RESULTS / "table1-motions.json").read_text())
+
+    def rows() -> Iterator[Sequence[str]]:
+        for model in ("explicit", "power"):
+            paper = found["paper_percent"][model]
+            yield [f"the paper, {model}", *(f"{x:.3f}" for x in paper), "28" if model == "explicit" else "93", "", ""]
+            for chain, of in found["chains"].items():
+                own = of["models"][model]
+                inside = sum(sum(each["explained"]) for each in of["models"].values())
+                total = len(paper) * len(of["models"])
+                counts = (f"{of['kept']}", f"{inside} of {total}") if model == "explicit" else ("", "")
+                cond = f"{own['median_condition_number']:.0f}"
+                yield [f"chain `{chain}`, {model}", *(f"{x:.2g}" for x in own["median_percent"]), cond, *counts]
+
+    yield from table(["", *found["parameters"], "Cond(W)", "motions kept", "inside"], rows())
+
+
 def draw_smallest(place: Path) -> None:
     """Draw typical errors over ripple, counts and delay, of two models and three paces."""
     import numpy as np
@@ -151,9 +171,40 @@ def draw_moves(place: Path) -> None:
     figure.savefig(place, dpi=110)
 
 
+def draw_motions(place: Path) -> None:
+    """Draw the medians and bands of Table 1's errors over random motions beside the paper's."""
+    import numpy as np
+    from matplotlib.figure import Figure
+
+    import idbench.experiments.reports.drawn  # noqa: F401  # letters as in reports
+
+    found = json.loads((RESULTS / "table1-motions.json").read_text())
+    names, paper = found["parameters"], found["paper_percent"]
+    figure = Figure(figsize=(12, 4.6), layout="constrained")
+    axes = figure.subplots(1, len(paper), sharey=True)
+    for panel, model in zip(axes, paper, strict=True):
+        at = np.arange(len(names))
+        for k, (chain, (color, label)) in enumerate(CHAINS.items()):
+            of = found["chains"][chain]["models"][model]
+            x = at + 0.24 * (k - 0.5)
+            panel.vlines(x, of["low_percent"], of["high_percent"], color=color, linewidth=5, alpha=0.45)
+            panel.plot(x, of["median_percent"], "o", color=color, markersize=4, label=label)
+        panel.plot(at, paper[model], "kx", markersize=7, markeredgewidth=1.8, label="the paper")
+        panel.set_yscale("log")
+        panel.set_ylim(5e-4, 50)
+        panel.set_xticks(at, names)
+        panel.set_title(f"{model} model", loc="left", fontsize=11)
+        panel.grid(axis="y", color="0.9")
+        panel.spines[["top", "right"]].set_visible(False)
+    axes[0].set_ylabel("error [%]: median, and 5 to 95 % of the motions")
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper left", ncols=3, frameon=False)
+    figure.savefig(place, dpi=110)
+
+
 ANSWERS_TABLES: dict[str, Callable[[], Iterator[str]]] = {
     "explicit-power": explicit_power,
     "moves": moves,
     "implicit-steps": implicit_steps,
+    "table1-motions": table1_motions,
     **{study: smallest(study) for study in SMALLEST},
 }

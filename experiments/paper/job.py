@@ -19,8 +19,7 @@ from idbench.sim.scenario.scenario_file import load
 from idbench.sim.trajectories import Quintic
 from idbench.sim.trajectories.quintic import draw_waypoint, draw_waypoints
 
-PAPER_CONDITION = {MODELS.create(name): PAPER[name].condition_number for name in ("explicit", "power")}
-"""Cond(W) of the paper's Table 1; that of the implicit model is the explicit one's."""
+SEARCHED = MODELS.create("explicit"), MODELS.create("power")  # Of the implicit model Cond(W) is the explicit one's
 
 FS = 100.0  # Sampling frequency [Hz]
 REST = 3.0  # Time at rest at both ends [s]
@@ -53,10 +52,14 @@ class TrajectorySearch:
     """It ends when both condition numbers are within this share of the paper's."""
     rounds: int = 300
     """Rounds after which it gives up."""
+    condition: tuple[float, float] = (PAPER["explicit"].condition_number, PAPER["power"].condition_number)
+    """Cond(W) of the explicit and of the power model; by default those of the paper's Table 1, Table 2 has 37 and 111."""
 
     def __post_init__(self) -> None:
         if self.seed < 0:
             raise ExperimentError(f"seed = {self.seed} must be 0 or a positive whole number")
+        if not all(1 < x < inf for x in self.condition):
+            raise ExperimentError(f"condition = {list(self.condition)}: both must be finite and above 1")
         for name in ("smallest_move", "velocity", "rounds"):
             if not getattr(self, name) > 0:
                 raise ExperimentError(f"{name} = {getattr(self, name)} must be above 0")
@@ -81,7 +84,8 @@ class TrajectorySearch:
                 progress(number + 1, distance)
             if distance <= self.tolerance:
                 tried = (number + 1) * CANDIDATES
-                return replace(best, origin=f"idbench search --seed {self.seed}: {tried} candidates, chosen by Cond(W) alone")
+                words = f"idbench search --seed {self.seed} --condition {self.condition[0]:g} {self.condition[1]:g}"
+                return replace(best, origin=f"{words}: {tried} candidates, chosen by Cond(W) alone")
         raise ExperimentError(
             f"no motion within {self.tolerance:.2%} of the paper's condition numbers in {self.rounds} rounds "
             f"(closest: {distance:.2%}); try another seed"
@@ -93,7 +97,7 @@ class TrajectorySearch:
         log = MotionLog(FS, q, np.zeros_like(q), TorqueChannel("instantaneous"))  # W holds no torque
         problem = Problem((log,), scara(), ExplicitModel(), replace(CHAINS.create(CHAIN), trim=REST))
         worst = np.zeros(len(scenarios))
-        for model, target in PAPER_CONDITION.items():
+        for model, target in zip(SEARCHED, self.condition, strict=True):
             rows = problem.with_model(model).rows
             share = np.abs(np.log(rows.factors.together.condition_number / target))
             (to_rows,) = rows.maps  # every row must have an instant that is not masked, however little that is
@@ -135,9 +139,6 @@ def table1_of(asked: Table1Request, searching: Searching | None = None) -> Table
     if asked.seed is not None and asked.scenario is not None:
         raise ExperimentError(f"--seed {asked.seed} and --scenario {asked.scenario} name two trajectories: give one")
     chains = CHAINS_COMPARED if asked.chain == "all" else (asked.chain,)
-    return Table1(load(asked.scenario or SCENARIO) if asked.seed is None else searched(asked.seed, searching), chains)
-
-
-def searched(seed: int, searching: Searching | None = None) -> Scenario:
-    """Return a scenario whose trajectory has the paper's condition numbers."""
-    return TrajectorySearch(seed=seed).run(Robot.load("scara"), searching)
+    if asked.seed is None:
+        return Table1(load(asked.scenario or SCENARIO), chains)
+    return Table1(TrajectorySearch(asked.seed).run(Robot.load("scara"), searching), chains)

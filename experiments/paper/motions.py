@@ -9,14 +9,12 @@ import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from io import BytesIO
 from itertools import groupby
 from operator import itemgetter
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from matplotlib.figure import Figure
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
@@ -154,8 +152,6 @@ class Table1Motions:
 
 FEW = 40  # Motions below which less than two lie outside of either end of the band
 
-COLORS = {"paper": "#b5651d", "paper_masked": "#2f6f9f"}
-
 NAMES = {"paper": "the paper's steps", "paper_masked": "the same, reversals left out"}
 
 
@@ -211,28 +207,3 @@ def relations(errors: Errors) -> dict[str, dict[str, float]]:
         shares = {"reached": float((means >= paper).mean()), "all_larger": worse}
         found[model] = {"paper": paper, "median": float(np.median(means)), **shares}
     return found
-
-
-def picture(found: Table1Motions) -> bytes:
-    """Return the medians and bands of every error beside the paper's, as a PNG."""
-    figure = Figure(figsize=(12, 4.6), layout="constrained")
-    axes = figure.subplots(1, len(PAPER), sharey=True)
-    for panel, model in zip(axes, PAPER, strict=True):
-        at = np.arange(len(found.truth))
-        for k, chain in enumerate(COMPARED):
-            low, middle, high = (found.errors[chain].percentiles(model, q) for q in (BAND[0], 50, BAND[1]))
-            x = at + 0.24 * (k - 0.5)
-            panel.vlines(x, low, high, color=COLORS[chain], linewidth=5, alpha=0.45)
-            panel.plot(x, middle, "o", color=COLORS[chain], markersize=4, label=NAMES[chain])
-        panel.plot(at, PAPER[model].error, "kx", markersize=7, markeredgewidth=1.8, label="the paper")
-        panel.set_yscale("log")
-        panel.set_ylim(5e-4, 50)
-        panel.set_xticks(at, list(found.truth))
-        panel.set_title(f"{model} model", loc="left", fontsize=11)
-        panel.grid(axis="y", color="0.9")
-        panel.spines[["top", "right"]].set_visible(False)
-    axes[0].set_ylabel(f"error [%]: median, and {BAND[0]:g} to {BAND[1]:g} % of the motions")
-    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper left", ncols=3, frameon=False)
-    file = BytesIO()
-    figure.savefig(file, format="png", dpi=110)
-    return file.getvalue()

@@ -208,7 +208,7 @@ WHY = (
     "explicit model's errors of friction are {paper:.2g} and {paper_masked:.2g} times the paper's (geometric means), those of "
     "ZZR1 {zzr1:.2g} times at most; single errors are up to {most:.0f} times the paper's. Over those of the explicit model, "
     "errors of the implicit and the power model are {over} times (geometric means). How errors scatter over motions: "
-    "--motions 3500. Causes of chain paper's errors, each removed in turn (largest error in %):"
+    "--motions 2000. Causes of chain paper's errors, each removed in turn (largest error in %):"
 )
 
 EXACT = (

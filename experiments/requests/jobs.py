@@ -214,7 +214,7 @@ class Table1Request:
     chain: str = "all"
     """Chain of signal processing: all, or one by name (paper, paper_masked, idbench, ...)."""
     motions: words.Count = None
-    """Show the errors over this number of random motions of the paper's class (runs/table1-motions). 3500 take about five
+    """Show the errors over this number of random motions of the paper's class (runs/table1-motions). 2000 take about ten
     minutes."""
     seed: words.Count = None
     """Search another trajectory from this seed."""

@@ -19,7 +19,7 @@ FILES: Mapping[str, tuple[str, ...]] = {
     "run": (*COMMON, "scenario.toml", "servo.toml", "commands.csv"),
     "identify": (*COMMON, "report.html"),
     "table1": COMMON,
-    "table1-motions": (*COMMON, "motions.png"),
+    "table1-motions": ("summary.json",),
     "table2": COMMON,
     "excite": (*COMMON, "scenario.toml", "report.html", "motion*.csv"),
     "payload": ("summary.json", REPORT),

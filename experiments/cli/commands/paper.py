@@ -11,12 +11,13 @@ from idbench.experiments.cli.commands.inner import doubt_window, recording_of, r
 from idbench.experiments.cli.options.jobs import SearchCommand, Table1Command, Table2Command
 from idbench.experiments.cli.saving import folder_of, saved
 from idbench.experiments.errors import ExperimentError
-from idbench.experiments.paper.job import Searching, searched, table1_of
+from idbench.experiments.paper.job import Searching, TrajectorySearch, table1_of
 from idbench.experiments.paper.table1 import print_table1
 from idbench.experiments.paper.table2 import Table2, print_table2
 from idbench.experiments.results.page import Page, progress_of
 from idbench.experiments.results.writing import require_free, write_text
 from idbench.identify.files.log_file import write_log
+from idbench.sim.robot.robot import Robot
 from idbench.sim.scenario.scenario_file import load, to_toml
 
 
@@ -40,7 +41,7 @@ def compare(options: Table1Command) -> None:
 
 def _over_motions(options: Table1Command, motions: int) -> None:
     """Lay the distribution of errors over random motions beside the paper's."""
-    from idbench.experiments.paper.motions import Table1Motions, picture, print_motions  # with figures, which tables lack
+    from idbench.experiments.paper.motions import Table1Motions, print_motions
 
     if options.scenario is not None or options.chain != "all":
         what = "--motions draws motions of its own and compares the paper's chains"
@@ -51,8 +52,8 @@ def _over_motions(options: Table1Command, motions: int) -> None:
         with progress_of("drawing and identifying motions") as progress:
             found = Table1Motions(motions, options.seed or 0, progress=progress)
             print_motions(page, found)
-        with saved(page, folder, found.summary(), {}, ": the picture is motions.png") as attempts:
-            attempts.file("motions.png", lambda: picture(found))
+        with saved(page, folder, found.summary(), {}, ""):
+            pass
 
 
 def search(options: SearchCommand) -> None:
@@ -62,7 +63,7 @@ def search(options: SearchCommand) -> None:
     page = Page()
     with closing(page):
         with _searching() as told:
-            scenario = searched(options.seed, told)
+            scenario = TrajectorySearch(options.seed, condition=options.condition).run(Robot.load("scara"), told)
         if options.out is None:
             page.out(to_toml(scenario).rstrip("\n"))
             return
