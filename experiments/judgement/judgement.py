@@ -158,14 +158,14 @@ def _finding(judgement: Judgement, causes: Sequence[Cause]) -> str:
     if one is None or verdict is None:
         return "Result: not validated"
     model = one.fit.leading
+    result = f"Result: {verdict.word}{'' if model == 'explicit' else f' ({model} model)'}:"
     if verdict.wrong:
-        return f"Result: {verdict.word} ({model} model): {verdict.wrong[0].finding}"
+        return f"{result} {verdict.wrong[0].finding}"
     worst = _worst(one)
     beyond = float(np.nanmax(np.nan_to_num(one.torques[model].percent_of_level(one.torques[model].excess), posinf=np.inf)))
     most = {"good": GOOD, "fair": FAIR}.get(verdict.word, np.inf)
     noisy = f", {error_percentage(beyond)} beyond noise and sigma," if beyond < most < worst else ""
-    off = f"torque errors of at most {error_percentage(worst)}{noisy}"
-    found = f"Result: {verdict.word} ({model} model), {off} on {one.title.finding}"
+    found = f"{result} torques within {error_percentage(worst)}{noisy} on {one.title.finding}"
     seen = _power(judgement.fit) if verdict.word == "good" and not causes else []
     far = [] if verdict.word == "poor" or causes else WrittenRobot(judgement.fit, model).strayed
     return "; ".join([found, *(cause.words for cause in causes[:1]), *seen, *far])
@@ -178,11 +178,11 @@ def _power(fit: Fit) -> Iterator[str]:
     worst, joint = _hidden(fit)
     if joint:
         if not worst < 1:
-            yield f"it cannot see a wrong torque constant of {joint}"
+            yield f"cannot see a gain error of {joint}"
         elif worst > WEAK:
-            yield f"it would not see a torque constant of {joint} that is {error_percentage(100 * worst)} off"
+            yield f"would not see a gain error of {joint} below {error_percentage(100 * worst)}"
         else:
-            yield f"sees torque constants that are {error_percentage(100 * worst)} off"
+            yield f"sees gain errors above {error_percentage(100 * worst)}"
 
 
 def _next(judgement: Judgement, warnings: Mapping[str, Sequence[str]]) -> str:

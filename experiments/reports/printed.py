@@ -219,7 +219,7 @@ def print_held_out(console: Console, one: HeldOut | Unjudged, whole: Sequence[st
     for model, verdict in one.verdicts.items():
         if model not in torques and WORDS.index(verdict.word) > WORDS.index(worst):
             off = error_percentage(float(np.nanmax(one.torques[model].percent)))
-            console.print(Text(f"{model}: {verdict.word}, torque errors of at most {off}"), soft_wrap=True)
+            console.print(Text(f"{model}: {verdict.word}, torques within {off}"), soft_wrap=True)
     for words in _details_of(one, first.standing) if verbose else ():
         console.print(Text(words), soft_wrap=True)
     console.print()

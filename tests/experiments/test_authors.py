@@ -91,7 +91,7 @@ def test_an_example_is_an_arm_with_two_logs_that_agree(here, idbench, ran):
     assert sorted(path.name for path in (here / "mine").iterdir()) == ["arm.xml", "log.csv", "second.csv", "truth.csv"]
     words = "--robot mine/arm.xml --torque held --torque-delay estimate --validate mine/second.csv"
     first, *lines = ran("identify mine/log.csv", words).out.splitlines()
-    assert first.startswith("Result: good (explicit model)")
+    assert first.startswith("Result: good: torques within ")
     with (here / "mine" / "truth.csv").open() as file:
         truth = {row["parameter"]: float(row["value"]) for row in csv.DictReader(file)}
     found = {line.split()[0]: line.split()[1] for line in lines if line.split()[:1] and line.split()[0] in truth}

@@ -89,8 +89,8 @@ def test_one_model_and_an_estimated_delay(csv, ran):
     assert re.search(r"torque: held, delay \S+ ms, estimated from the log", printed)
     assert "power" not in printed
     first, then, *_ = printed.splitlines()
-    assert first.startswith("Result: good (explicit model), torque errors of at most ")
-    assert re.search(r"on the last quarter of the log; sees torque constants that are \S+ % off$", first)
+    assert first.startswith("Result: good: torques within ")
+    assert re.search(r"on the last quarter of the log; sees gain errors above \S+ %$", first)
     assert then.startswith("next: ")
 
 

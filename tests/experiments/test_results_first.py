@@ -51,7 +51,7 @@ def test_a_view_that_fails_leaves_everything_else(view, error, idbench, logs, tm
     code, out, err = idbench("identify", logs / "first.parquet", *WORDS, "--out", "found", "--write", "found/arm.json")
     assert code == 2
     assert "explicit model, WLS" in out
-    assert out.startswith("Result: good (explicit model)")
+    assert out.startswith("Result: good: torques within ")
     assert len(err.splitlines()) == 1
     assert f"idbench: {name}: " in err
     assert "the estimates are printed, and with the logs in found" in err

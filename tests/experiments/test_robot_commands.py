@@ -100,7 +100,7 @@ def test_a_file_without_motors_ranges_and_room_is_described_simulated_and_judged
     assert f"--robot {arm}" in ran("export first").out
     words = "--validate second --write out.xml --model explicit --out found --no-rerun"
     out, _, summary = ran("identify first", words)
-    assert out.startswith("Result: good (explicit model)")
+    assert out.startswith("Result: good: torques within ")
     assert max(summary["validation"]["models"]["explicit"]["position_error_rms"]) < 1e-3
 
 
@@ -110,7 +110,7 @@ def test_an_offset_is_no_error_of_the_simulated_robot(ran, changed):
     words = "identify", path, "--robot puma560 --model explicit"
     assert "with --add offset the worst joint's error falls from" in ran(*words).out
     out, _, summary = ran(*words, "--add offset --out found --no-rerun --write out.xml")
-    assert out.startswith("Result: good (explicit model)")
+    assert out.startswith("Result: good: torques within ")
     assert "off1, off2, off3, off4, off5, off6 have no place in the file and are left out" in out
     assert max(summary["validation"]["models"]["explicit"]["position_error_rms"]) < 1e-3
 

@@ -24,7 +24,7 @@ def log():
 def test_a_torque_with_the_other_sign_is_no_fair_result(log, signs, tmp_path, ran):
     write_log(replace(log, tau=log.tau * signs), tmp_path / "log.csv")
     first, then = ran("identify log.csv --robot two_link --torque instantaneous").out.splitlines()[:2]
-    assert first.startswith("Result: good (explicit model)" if min(signs) > 0 else "Result: poor")
+    assert first.startswith("Result: good: torques within" if min(signs) > 0 else "Result: poor")
     assert (then == f"next: --gain {signs[0]} {signs[1]}") == (min(signs) < 0)
 
 

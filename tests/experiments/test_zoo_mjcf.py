@@ -114,7 +114,7 @@ def test_every_way_ends_with_a_result_and_files_of_the_true_robot(real, way, tmp
     write_log(real.log, tmp_path / "log.csv")
     words = ["identify", "log.csv", "--robot", str(real.path), "--torque", "instantaneous", "--no-rerun"]
     assert main([*words, *WAYS[way]]) == 0, capsys.readouterr().err
-    assert "Result: good (explicit model)" in capsys.readouterr().out
+    assert "Result: good: torques within" in capsys.readouterr().out
     if not Path("d.xml").exists():
         return
     rng, n = np.random.default_rng(3), range(real.true.n)
