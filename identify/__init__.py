@@ -75,7 +75,6 @@ from idbench.identify.judge.residuals import filtered as filtered
 from idbench.identify.judge.residuals import instants as instants
 from idbench.identify.judge.residuals import measured_state as measured_state
 from idbench.identify.judge.residuals import noise_spectra as noise_spectra
-from idbench.identify.judge.residuals import spectrum as spectrum
 from idbench.identify.judge.validation import Validation as Validation
 from idbench.identify.judge.validation import split as split
 from idbench.identify.judge.validation import validate as validate

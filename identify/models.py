@@ -12,6 +12,7 @@ import numpy as np
 from idbench.identify.arrays import Array, Columns, Multipliers, combined
 from idbench.identify.basis.basis import Basis
 from idbench.identify.blame import expect
+from idbench.identify.errors import SettingError
 from idbench.identify.plugins import Table
 from idbench.identify.signals.signals import Signals, State
 
@@ -131,9 +132,16 @@ class AbstractModel(ABC):
 
 
 def rows_per_sample(model: AbstractModel, n: int) -> int:
-    """Return the number of equations per sample for a robot of `n` joints: n, or 1 for power."""
+    """Return the number of equations per sample for a robot of `n` joints: n, 1 for power, n + 1 for both."""
     still = np.zeros((n, 2))
     return 1 + max(row for row, _ in model.B(State(still, still, lambda x: x)))
+
+
+def require_torques_once(model: AbstractModel, n: int) -> None:
+    """Raise SettingError if rows of a model have torques of other rows: their covariance is then nearly singular."""
+    still = np.zeros((n, 2))
+    if len(model.B(State(still, still, lambda x: x))) > n:
+        raise SettingError("rows of this model have the torques, and so the noise, of others: take estimator WLS or OLS")
 
 
 @dataclass(frozen=True)

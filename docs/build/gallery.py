@@ -34,11 +34,17 @@ SCENARIOS = {
     "ripple": ("friction", "Cogging: residuals over the position are a wave, once per slot."),
     "saturation": ("overview", "Pink: the drive is at its limit, and the logged torque is not the one that acted."),
     "delay": ("overview", "A late torque: residuals have the shape of the torque's slope."),
-    "gain": ("overview", "A wrong torque constant: the residuals are flat, and all parameters 2 % off."),
+    "gain": (
+        "overview",
+        "The torque constant of joint 1 is 15 % off: of two joints only their ratio shows, in joint 2.",
+    ),
     "stribeck": ("friction", "Friction near standstill: over the velocity a peak beside zero, which the law lacks."),
     "payload": ("overview", "A payload: the residuals repeat the torque of gravity and inertia."),
-    "ruckig": ("overview", "Jerk-limited moves: long stretches of constant velocity, short ones near rest."),
-    "everything-at-once": ("overview", "All imperfections together: which one is which, the next lines name."),
+    "ruckig": (
+        "overview",
+        "Jerk-limited moves: velocities rise and fall in straight lines, with little time near rest.",
+    ),
+    "everything-at-once": ("overview", "All imperfections together; the largest is named first."),
     "arm": ("overview", "A seven-joint arm: the torques of links and rotors far from the base are small."),
     "servo": ("overview", "A servo: it follows its commands late, and no faster than its rate limit."),
     "servo-backlash": ("drive", "Play: the rotor moves while the link rests, wherever the load changes sides."),
@@ -145,7 +151,7 @@ def _line(case: dict[str, object]) -> str:
 
 def _figure(name: str, see: str, command: str) -> str:
     said = json.loads((PLACE / f"{name}.json").read_text())
-    quoted = f" *{said[0].partition(';')[0]}*" if said else ""
+    quoted = f" *{said[0].partition('; once')[0]}*" if said else ""
     what = name.removeprefix(OF_FAULT)
     return f"### {what}\n\n![{what}](gallery/{name}.webp)\n\n`{command}`. {see}{quoted}\n"
 

@@ -1,10 +1,10 @@
 """Makes the kept figures anew, each with its tables and pictures, and samples of them by which a test sees that they are stale.
 
-    uv run python docs/build/remake.py [--samples] [NAME ...]
+    uv run python docs/build/remake.py [--samples | --stale] [NAME ...]
 
-Names are those of docs/results; all by default, which takes hours. `--samples` computes the samples alone. What is kept of
-each: the command, a digest of the sources that it depends on, and the sample: of a study two runs of the first combination
-of settings, of Table 2 one of its causes.
+Names are those of docs/results; all by default, which takes hours. `--samples` computes the samples alone, `--stale` names
+figures that were made with other sources. What is kept of each: the command, a digest of the sources that it depends on, and
+the sample: of a study two runs of the first combination of settings, of Table 2 one of its causes.
 """
 
 import hashlib
@@ -76,7 +76,15 @@ def sample(name: str) -> dict[str, list[float]]:
     models = [model for model in whole.models if whole.of_servos or whole.logs_of(model) <= LOGS]
     fewer = {"models": tuple(models[:MODELS]), "estimators": whole.estimators[:ESTIMATORS]}
     table = idbench.study(replace(whole, axes=axes, seeds=RUNS, **fewer))
-    return {_label(cell): short([float(x) for x in 100 * np.abs(cell.error).mean(axis=0)]) for cell in table.cells if cell.runs}
+    varied = [axis for axis in whole.axes if len(axis.points) > 1]
+    first = {axis.field: float(axis.points[0]) if axis.numeric else axis.label(axis.points[0]) for axis in varied}
+    errors = {
+        _label(first | {key: cell.settings[key] for key in cell.settings if key in first}, *cell.names): 100
+        * np.abs(cell.error).mean(axis=0)
+        for cell in table.cells
+        if cell.runs
+    }
+    return {label: short([float(x) for x in off]) for label, off in errors.items()}
 
 
 def _first(axis: Any) -> Any:
@@ -85,8 +93,8 @@ def _first(axis: Any) -> Any:
     return replace(axis, values=axis.points[:1], lowest=None, highest=None, count=None)
 
 
-def _label(cell: Any) -> str:
-    return ", ".join([*(f"{key} {x}" for key, x in cell.settings.items()), *cell.names])
+def _label(settings: Mapping[str, Any], *names: str) -> str:
+    return ", ".join([*(f"{key} {x}" for key, x in sorted(settings.items())), *names])
 
 
 def _of_table2() -> Iterator[tuple[str, list[float]]]:
@@ -113,8 +121,13 @@ def apart(name: str, found: Mapping[str, list[float]]) -> tuple[str, float] | No
         return None
     else:
         rows = [cell for cell in json.loads((RESULTS / f"{name}.json").read_text()) if "rmse_percent" in cell]
-        every = {_named(cell): [x or 0.0 for x in cell["rmse_percent"]] for cell in rows}
+        every = {
+            _label(cell["settings"], cell["chain"], cell["estimator"], cell["model"]): [x or 0.0 for x in cell["rmse_percent"]]
+            for cell in rows
+        }
         limit = FAR
+    if every and not every.keys() & found.keys():
+        return "no sample is of the kept figure, whose typical error", float("nan")
     for label, errors in found.items():
         if label in every and (both := [(a, b) for a, b in zip(errors, every[label], strict=True) if a and b]):
             ratio = float(np.exp(np.mean([np.log(abs(a / b)) for a, b in both])))
@@ -134,11 +147,6 @@ def _alike(a: Array, b: Array) -> bool:
     return bool((np.abs(a - b) <= limit).all())
 
 
-def _named(cell: Mapping[str, Any]) -> str:
-    settings = (f"{key} {x}" for key, x in cell["settings"].items())
-    return ", ".join([*settings, cell["chain"], cell["estimator"], cell["model"]])
-
-
 def digest() -> str:
     """Return a digest of the sources that figures depend on."""
     found = hashlib.sha256()
@@ -155,16 +163,20 @@ def made() -> dict[str, dict[str, Any]]:
 
 
 def whole(name: str) -> None:
-    """Make a figure anew, and what is drawn of it."""
+    """Make a figure anew; of those that no command of idbench makes say the command."""
     from idbench.experiments.cli import main as idbench
 
     words = commands()[name].split()
     if words[0] != "idbench":
-        sys.exit(f"{name}: run {commands()[name]}")
+        print(f"{name}: run {commands()[name]}")
+        return
     with TemporaryDirectory(prefix="idbench-") as folder:
         out = Path(folder) / name
         if idbench([*words[1:], "--out", str(out), "--no-rerun"]):
             sys.exit(f"{commands()[name]} failed")
+        if name == "table1-motions":
+            (RESULTS / f"{name}.json").write_text((out / "summary.json").read_text())
+            return
         keep(Path(folder))
         keep_conclusion(Path(folder))
 
@@ -187,4 +199,14 @@ def main(names: list[str], remade: Callable[[str], None] | None) -> None:
 
 if __name__ == "__main__":
     asked = [word for word in sys.argv[1:] if not word.startswith("--")]
-    main(asked or list(commands()), None if "--samples" in sys.argv else whole)
+    if unknown := [name for name in asked if name not in commands()]:
+        sys.exit(f"no kept figure {unknown[0]!r}; known: {', '.join(commands())}")
+    if "--stale" in sys.argv:
+        now = digest()
+        print("\n".join(name for name, one in made().items() if one["sources"] != now) or "all are of these sources")
+    else:
+        main(asked or list(commands()), None if "--samples" in sys.argv else whole)
+        from tables import PAGES, filled  # when what they are made of is there
+
+        for page in PAGES:
+            (DOCS / page).write_text(filled((DOCS / page).read_text()))

@@ -177,7 +177,7 @@ class Layer:
 def row_names(form: str, kinds: int, joints: Sequence[str]) -> Sequence[str]:
     """Names of the kinds of row of a model: after their joint, or after the model if theirs is another unit."""
     if form not in UNITS:
-        return joints if kinds == len(joints) else [form] * kinds
+        return [*joints, "power"][:kinds] if kinds in (len(joints), len(joints) + 1) else [form] * kinds
     return [form] if kinds == 1 else [f"{form} {joint}" for joint in joints]
 
 

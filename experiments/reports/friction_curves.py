@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from idbench.experiments.identification.fit import Fit
-from idbench.identify import MODELS, Array, Basis, Chain, Instants, OfJoints, instants, noise_spectra, spectrum
+from idbench.identify import MODELS, Array, Basis, Chain, Instants, OfJoints, instants, noise_spectra
 from idbench.identify.arrays import combined
 from idbench.identify.basis import LoadFriction
 from idbench.identify.basis.joint_law import AbstractFriction
@@ -15,6 +15,7 @@ from idbench.identify.basis.of_joints import block_of_all_joints
 from idbench.identify.judge.residuals import filtered
 from idbench.identify.rows.row_map import Kernel
 from idbench.identify.signals.signals import Signals, State
+from idbench.identify.signals.spectra import welch
 
 RESOLUTION = 0.5  # Distance of the frequencies [Hz]
 
@@ -67,8 +68,8 @@ def spectra(fit: Fit, left: Mapping[str, Instants]) -> Iterator[Spectrum]:
 
 def _density(left: Instants, row: int, fs: float) -> tuple[Array, Array]:
     weight = left.weight[row]
-    f, density = spectrum(left.residual[row] * weight, fs, RESOLUTION)
-    return f, density / np.sqrt(max(np.mean(weight**2), 1e-12))
+    f, density = welch(left.residual[row] * weight, fs, min(left.residual.shape[-1], round(fs / RESOLUTION)))
+    return f, np.sqrt(density / max(np.mean(weight**2), 1e-12))
 
 
 FRICTIONS = ("viscous friction", "Coulomb friction", "friction", "shape of friction", "offset")

@@ -145,9 +145,11 @@ class Page(Console):
     def warn(self, groups: Mapping[str, Sequence[str]]) -> None:
         """Print warnings by what they are about, in the order in which to check them, each once on a page."""
         kept: dict[str, list[str]] = self.found.setdefault("warnings", {})
-        said = {warning for warnings in kept.values() for warning in warnings}
-        new = {about: [x for x in dict.fromkeys(warnings) if x not in said] for about, warnings in groups.items()}
-        there = {about: warnings for about, warnings in new.items() if warnings}
+        said, there = {warning for warnings in kept.values() for warning in warnings}, dict[str, list[str]]()
+        for about, warnings in groups.items():
+            if new := [warning for warning in dict.fromkeys(warnings) if warning not in said]:
+                there[about] = new
+                said.update(new)
         if len(there) > 1:
             self.print(Text("Check these first, in this order:", style="bold"))
         for number, (about, warnings) in enumerate(there.items(), 1):

@@ -32,7 +32,10 @@ def locked(folder: Path, busy: ExperimentError) -> Iterator[None]:
     if fcntl is None:
         yield
         return
-    held = os.open(folder, os.O_RDONLY)
+    try:
+        held = os.open(folder, os.O_RDONLY)
+    except OSError as error:
+        raise ResultsError(f"cannot hold {folder}: {error.strerror}; choose another --out") from error
     try:
         with suppress(OSError):  # a file system without locks: the exchange of files looks once more
             try:

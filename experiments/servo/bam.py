@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from idbench.experiments.errors import ExperimentError
-from idbench.identify.errors import require_positive
-from idbench.identify.servo import Servo, ServoFit
+from idbench.identify.errors import require_not_negative, require_positive
+from idbench.identify.servo import SERVO_FRICTIONS, Servo, ServoFit
 from idbench.identify.servo.law import PUBLISHED
-from idbench.identify.servo.parameters import SERVO_PARAMETERS, ServoLaw
+from idbench.identify.servo.parameters import LATEST, SERVO_PARAMETERS, ServoLaw
 
 BAM = {
     "armature": "Ia", "friction_base": "Fs", "friction_viscous": "Fv", "friction_stribeck": "Fst", "dtheta_stribeck": "vs",
@@ -25,7 +25,8 @@ LAWS = {"m1": "coulomb", "m2": "stribeck", "m3": "load", "m4": "load-stribeck", 
 NONE = {"load_friction_motor_stribeck": 0.0, "load_friction_external_stribeck": 0.0, "alpha": 1.0}
 """What its laws have beyond ours, and the values at which they are ours."""
 
-RIG = "q_offset", "model", "actuator", "kt", "R", "error_gain_ratio"  # Read otherwise, or of the bench that it was measured on
+MOTOR = "kt", "R", "armature"
+RIG = "q_offset", "model", "actuator", *MOTOR, "error_gain_ratio"  # Read otherwise, or of the bench that it was measured on
 
 
 def bam_of(fit: ServoFit, model: str) -> tuple[str, list[str]]:
@@ -44,40 +45,41 @@ def bam_of(fit: ServoFit, model: str) -> tuple[str, list[str]]:
 
 
 def device_of_bam(path: Path) -> dict[str, Any]:
-    """Device of a published file; ExperimentError if it is none."""
+    """Device of a published file; ExperimentError if it is none, or of a motor without kt and R."""
     try:
         given = json.loads(path.read_text(encoding="utf-8"))
-        motor = {name: float(given[name]) for name in ("kt", "R", "armature")}
-        require_positive(**motor)
-        values = {letter: float(given[name]) for name, letter in BAM.items() if given.get(name) is not None}
-        law, published = (
-            LAWS[given["model"]],
-            {name.lower().replace("-", ""): name for name in PUBLISHED}.get(given["actuator"]),
-        )
-        ratio = float(given.get("error_gain_ratio", 1.0))
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        wrong = f"it has no {error}" if isinstance(error, KeyError) else error
-        raise ExperimentError(f"{path} is no parameter file of BAM (model, actuator, kt, R, armature ...): {wrong}") from error
-    a = motor["kt"] / motor["R"]
-    values = {"a": a, "b": motor["kt"] * a} | values | ({"gain_error": ratio - 1} if ratio != 1 else {})
-    if impossible := [x for x, value in values.items() if not SERVO_PARAMETERS[x].low <= value < np.inf]:
-        raise ExperimentError(f"{path}: {impossible[0]} = {values[impossible[0]]:g} is impossible")
-    beyond = {name: x for name, x in given.items() if name not in (*BAM, *RIG) and x and x != NONE.get(name)}
-    of = {
-        x: {"value": values[x], "sigma": None, "spread": None, "unit": y.unit}
-        for x, y in SERVO_PARAMETERS.items()
-        if x in values
+        if given.get("model") not in LAWS or [name for name in MOTOR if name not in given]:
+            raise ValueError(f"model must be one of {', '.join(LAWS)}, of a motor with {', '.join(MOTOR)}")
+        ours = {name: given.get(name) for name in (*BAM, *NONE, *RIG) if name not in ("model", "actuator")}
+        more = {name: x for name, x in given.items() if isinstance(x, int | float)}
+        numbers = {name: float(x) for name, x in (ours | more).items() if x is not None}
+        require_positive(**{name: numbers[name] for name in MOTOR}, max_velocity=numbers.get("max_velocity", 1.0))
+        require_not_negative(**{name: x for name, x in numbers.items() if name != "q_offset"})
+        if (delay := numbers.get("command_delay", 0.0)) > LATEST:
+            raise ValueError(f"command_delay = {delay:g} s is longer than {LATEST:g} s")
+    except (OSError, ValueError, TypeError, AttributeError, OverflowError) as error:
+        raise ExperimentError(f"{path} is no parameter file of BAM: {error}") from error
+    a, law = numbers["kt"] / numbers["R"], LAWS[given["model"]]
+    own = {"Ia", "Fs", "Fv", "delay", "rate", *SERVO_FRICTIONS[law]}
+    values = {"a": a, "b": numbers["kt"] * a, "Fs": 0.0, "Fv": 0.0, "delay": 0.0}
+    values |= {letter: numbers[name] for name, letter in BAM.items() if name in numbers and letter in own}
+    units = {x: parameter.unit for x, parameter in SERVO_PARAMETERS.items() if x in values}
+    ratio = numbers.get("error_gain_ratio", 1.0)
+    published = {name.lower().replace("-", ""): name for name in PUBLISHED}.get(given.get("actuator"))
+    return {
+        "name": path.stem,
+        "source": f"{path}, BAM {given['model']} of {given.get('actuator')}",
+        "known": {"model": published, "gain": ratio * PUBLISHED[published].gain} if published else {},
+        "friction": law,
+        "parameters": {x: {"value": values[x], "sigma": None, "spread": None, "unit": unit} for x, unit in units.items()},
+        "beyond": {name: x for name, x in numbers.items() if name not in (*BAM, *RIG) and x and x != NONE.get(name)},
     }
-    known = {"model": published} if published else {}
-    about = f"{path}, BAM {given['model']} of {given['actuator']}"
-    return {"name": path.stem, "source": about, "known": known, "friction": law, "parameters": of, "beyond": beyond}
 
 
 def require_drive(device: Mapping[str, Any]) -> None:
     """Raise ExperimentError if a file of a device lacks what its torques follow from."""
-    if missing := [key for key in ("model", "supply") if key not in device["known"]]:
-        ways = {
-            "model": f"the gain of this actuator is not known; those of {', '.join(PUBLISHED)} are",
-            "supply": "BAM does not write the supply: add --supply 7.4, in V, as it was measured with",
-        }
-        raise ExperimentError(f"{device['source']}: {ways[missing[0]]}")
+    known, source = device["known"], device["source"]
+    if "model" not in known:
+        raise ExperimentError(f"{source}: the gain of this actuator is not known; those of {', '.join(PUBLISHED)} are")
+    if "supply" not in known:
+        raise ExperimentError(f"{source}: BAM does not write the supply: add --supply 7.4, in V, as it was measured with")

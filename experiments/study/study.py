@@ -161,7 +161,7 @@ class Study:
         if self.of_servos or self.rows == "own":
             return self.realizations
         n = next(iter(self.subjects.values())).basis.n
-        return self.realizations * n // rows_per_sample(self.created_models[model], n)
+        return self.realizations * max(1, n // rows_per_sample(self.created_models[model], n))
 
     @cached_property
     def most_logs(self) -> int:

@@ -14,7 +14,7 @@ from idbench.identify.noise.propagation import NoiseLevels
 from idbench.identify.rows.chain import Chain
 from idbench.identify.rows.row_map import Kernel
 from idbench.identify.signals.signals import Signals, State
-from idbench.identify.signals.spectra import gain_of, welch
+from idbench.identify.signals.spectra import gain_of
 
 EVERY = 50.0  # Frequency of the instants over which the robot's slopes are averaged [Hz]
 
@@ -137,20 +137,6 @@ def binned(x: Array, y: Array, weight: Array, edges: Array) -> Array:
     """
     total, summed = (np.histogram(x, edges, weights=each)[0] for each in (weight, weight * y))
     return np.divide(summed, total, out=np.full(len(total), np.nan), where=total > 0)
-
-
-def spectrum(y: Array, fs: float, resolution: float) -> tuple[Array, Array]:
-    """Return frequencies [Hz] and the amplitude density of `y`, shape (time,), in its unit per sqrt(Hz) (Welch).
-
-    Parameters
-    ----------
-    y : Array, shape (time,)
-        Sampled at `fs` [Hz].
-    resolution : float
-        Distance of the frequencies [Hz]; wider if `y` is shorter than its inverse.
-    """
-    f, density = welch(y, fs, min(len(y), round(fs / resolution)))
-    return f, np.sqrt(density)
 
 
 def cutoffs(chain: Chain, fs: float) -> Mapping[str, float]:

@@ -255,7 +255,8 @@ def _tilted(x: _Joint, model: Any) -> None:
 
 
 def _shaken(x: _Joint, model: Any) -> None:
-    model.opt.gravity[:] += x.size * np.cross(_across(model), model.opt.gravity / np.linalg.norm(model.opt.gravity))
+    g = np.array(model.opt.gravity)
+    model.opt.gravity[:] += x.size * (np.cross(_across(model), g / np.linalg.norm(g)) if g.any() else _across(model))
 
 
 def _weightless(x: _Joint, model: Any) -> None:

@@ -123,7 +123,7 @@ def _fastest(before: Array, after: Array, limits: Array, shortest: float) -> Tra
     wanted.max_velocity, wanted.max_acceleration, wanted.max_jerk = limits.tolist()
     try:
         result = Ruckig(n).calculate(wanted, move)
-    except RuckigError as error:
+    except (RuckigError, ValueError) as error:  # of numbers so small or large that it has no name for what is wrong
         raise ScenarioError(f"ruckig refuses the move to {after.tolist()}: {' '.join(str(error).split())}") from error
     if result not in (Result.Working, Result.Finished):
         raise ScenarioError(f"ruckig finds no move to {after.tolist()}: {result.name}")

@@ -99,14 +99,16 @@ def test_what_bam_has_no_place_for_is_said_or_refused():
             bam_of(SimpleNamespace(friction=friction, servo=loop, p=p), model)
 
 
+MX64 = {"kt": 1.6, "R": 3.4, "armature": 0.012, "friction_base": 0.04, "friction_stribeck": 0.03, "load_friction_motor": 0.1,
+        "load_friction_external": 0.05, "load_friction_motor_stribeck": 0.0, "load_friction_external_stribeck": 0.15,
+        "dtheta_stribeck": 0.4, "alpha": 1.5, "friction_viscous": 0.03, "model": "m5", "actuator": "mx64"}  # fmt: skip
+"""What BAM's files of an M5 have, and no more: neither a delay nor a rate limit."""
+
+
 def bam_file(folder, **other):
-    """File as BAM writes it of a model M5."""
-    given = {"kt": 1.27, "error_gain_ratio": 1.16, "R": 2.75, "armature": 0.0216, "q_offset": -0.07, "max_velocity": 5.11,
-             "command_delay": 0.005, "friction_base": 0.053, "friction_stribeck": 0.02, "load_friction_motor": 0.04,
-             "load_friction_external": 0.24, "load_friction_motor_stribeck": 0.0, "load_friction_external_stribeck": 0.15,
-             "dtheta_stribeck": 0.37, "alpha": 1.0, "friction_viscous": 0.03, "model": "m5", "actuator": "sts3215"}  # fmt: skip
+    """Return the path of such a file, with other values; None leaves a key out."""
     path = folder / "m5.json"
-    path.write_text(json.dumps({key: x for key, x in (given | other).items() if x is not None}))
+    path.write_text(json.dumps({key: x for key, x in (MX64 | other).items() if x is not None}))
     return path
 
 
@@ -123,42 +125,56 @@ def test_what_is_written_for_bam_is_read_back(tmp_path):
         "rate": 4.8,
         "gain_error": 0.1,
     }
-    known = {letter: x for letter, x in p.items() if letter != "offset"}
+    known = {letter: x for letter, x in p.items() if letter not in ("offset", "gain_error")}
     for law, more in LAWS.items():
         path = tmp_path / "servo.json"
         path.write_text(bam_of(SimpleNamespace(friction=law, servo=servo, p=p | more), "MX-64")[0])
         read = device_of(str(path))
         values = {letter: of["value"] for letter, of in read["parameters"].items()}
-        assert {letter: x for letter, x in values.items() if x} == pytest.approx({"vs": 1.0, **known, **more})
+        assert values == pytest.approx({**known, **more})
         assert read["friction"] == law
         assert read["beyond"] == {}
-        assert read["known"] == {"model": "MX-64"}
+        assert read["known"] == {"model": "MX-64", "gain": pytest.approx(1.1 * 0.158)}
 
 
-def test_a_published_file_of_bam_becomes_a_dcmotor(idbench, tmp_path):
+@pytest.mark.parametrize("model", ["m1", "m2", "m3", "m4", "m5", "m6"])
+def test_a_published_file_of_bam_becomes_a_dcmotor(idbench, tmp_path, model):
     """Its motor: V = error_gain ratio kp vin (u - q), tau = kt (V - kt qd) / R, as BAM has it."""
-    path = bam_file(tmp_path)
-    code, out, _ = idbench("device", path, "--supply", 7.4, "--kp", 32, "--write", tmp_path / "arm.xml")
-    assert code == 0, out
-    assert "load_friction_external_stribeck = 0.15 has no place" in out
-    model = mujoco.MjModel.from_xml_path(str(tmp_path / "arm.xml"))
-    axis = model.actuator("swing_servo").trnid[0]
-    motor = ElementTree.parse(tmp_path / "arm.xml").find(".//dcmotor").attrib
+    given = {
+        "error_gain_ratio": 1.16,
+        "load_friction_base": 0.1,
+        "load_friction_stribeck": 0.1,
+        "load_friction_motor_quad": 0.01,
+    }
+    path = bam_file(tmp_path, model=model, **given)
+    made = tmp_path / "arm.xml", tmp_path / "servo.toml"
+    code, out, err = idbench("device", path, "--supply", 12, "--kp", 32, "--write", *made)
+    assert code == 0, err
+    assert "load_friction_motor_quad = 0.01 has no place" in out
+    mj = mujoco.MjModel.from_xml_path(str(made[0]))
+    axis = mj.actuator("swing_servo").trnid[0]
+    motor = ElementTree.parse(made[0]).find(".//dcmotor").attrib
     kp, *_, most = map(float, motor["controller"].split())
-    assert (motor["motorconst"], motor["resistance"]) == ("1.27", "2.75")
-    assert kp * 2.75 / 1.27 == pytest.approx(1.16 * 0.166 * 32 * 7.4)  # V = (R/K) kp (u - q)
-    assert most == pytest.approx(0.97 * 7.4)
-    assert model.dof_armature[axis] == pytest.approx(0.0216)
-    assert model.dof_frictionloss[axis] == pytest.approx(0.053)
+    assert (float(motor["motorconst"]), float(motor["resistance"])) == pytest.approx((1.6, 3.4))
+    assert kp * 3.4 / 1.6 == pytest.approx(1.16 * 0.158 * 32 * 12)  # V = (R/K) kp (u - q)
+    assert most == pytest.approx(0.9625 * 12)
+    assert mj.dof_armature[axis] == pytest.approx(0.012)
+    assert mj.dof_frictionloss[axis] == pytest.approx(0.04)
+    servo = ServoFile.read(made[1]).servo("swing", "log.csv")
+    assert (servo.gain, servo.kp, servo.supply) == (pytest.approx(1.16 * 0.158), 32, 12)
 
 
 @pytest.mark.parametrize(
     ("other", "message"),
     [
-        ({"R": None}, "it has no 'R'"),
+        ({"R": None}, "of a motor with kt, R, armature"),
         ({"kt": 0.0}, "kt = 0.0 must be a finite number above 0"),
-        ({"model": "m9"}, "it has no 'm9'"),
-        ({"friction_base": -0.1}, "Fs = -0.1 is impossible"),
+        ({"kt": 10**400}, "int too large to convert to float"),
+        ({"model": "m9"}, "model must be one of m1, m2, m3, m4, m5, m6"),
+        ({"friction_base": -0.1}, "friction_base = -0.1 must be a finite number, 0 or above"),
+        ({"load_friction_motor_stribeck": float("nan")}, "load_friction_motor_stribeck = nan must be a finite number"),
+        ({"command_delay": 3600.0}, "command_delay = 3600 s is longer than 1 s"),
+        ({"max_velocity": 0.0}, "max_velocity = 0.0 must be a finite number above 0"),
         ({"armature": "heavy"}, "could not convert string to float: 'heavy'"),
         ({}, "BAM does not write the supply: add --supply"),
         ({"actuator": "erob80_50"}, "the gain of this actuator is not known; those of STS3215"),
@@ -166,6 +182,6 @@ def test_a_published_file_of_bam_becomes_a_dcmotor(idbench, tmp_path):
 )
 def test_a_wrong_file_of_bam_is_named(idbench, tmp_path, other, message):
     code, _, err = idbench("device", bam_file(tmp_path, **other), "--write", tmp_path / "arm.xml")
-    assert code != 0
+    assert code == 2
     assert message in " ".join(err.split())
     assert not (tmp_path / "arm.xml").exists()

@@ -23,8 +23,8 @@ from idbench.identify import (
     measured_state,
     noise_spectra,
     scara,
-    spectrum,
 )
+from idbench.identify.signals.spectra import welch
 
 
 @pytest.mark.parametrize("model", MODELS)
@@ -59,9 +59,9 @@ def test_bins_hold_weighted_means_and_say_nothing_where_nothing_is():
 def test_a_spectrum_has_the_power_of_its_signal():
     """Parseval: the squared density, over all frequencies, is the variance."""
     y = 0.3 * np.sqrt(2) * np.sin(2 * np.pi * 7.0 * np.arange(4000) / 100)
-    f, density = spectrum(y, 100.0, 0.5)
+    f, density = welch(y, 100.0, 200)
     assert abs(f[np.argmax(density)] - 7.0) < 1e-9
-    np.testing.assert_allclose(np.sum(density**2) * (f[1] - f[0]), 0.09, rtol=1e-6)
+    np.testing.assert_allclose(np.sum(density) * (f[1] - f[0]), 0.09, rtol=1e-6)
 
 
 @pytest.mark.parametrize("fs", [100.0, 1000.0])
@@ -95,9 +95,9 @@ def test_the_spectra_are_those_of_noise_put_into_a_log(position, torque, log, tr
     left = instants(problem.signals[0], scara(), problem.model, chain, truth)
     for joint in (0, 1):
         weight = left.weight[joint]
-        f, seen = spectrum(left.residual[joint] * weight, log.fs, 0.5)
-        seen = seen / np.sqrt(np.mean(weight**2))
+        f, density = welch(left.residual[joint] * weight, log.fs, round(2 * log.fs))
+        seen = np.sqrt(density / np.mean(weight**2))
         levels = NoiseLevels(np.full(2, torque), np.full(2, position))
-        predicted = np.hypot(*(density[joint] for density in noise_spectra(problem, levels, f)))
+        predicted = np.hypot(*(each[joint] for each in noise_spectra(problem, levels, f)))
         inside = (f > 5) & (f < 40)
         assert np.exp(np.mean(np.log(seen[inside] / predicted[inside]))) == pytest.approx(1, abs=0.1)

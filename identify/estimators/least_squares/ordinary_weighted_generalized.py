@@ -11,6 +11,7 @@ from idbench.identify.estimators.estimate import Estimate
 from idbench.identify.estimators.estimator import AbstractEstimator, Need
 from idbench.identify.estimators.problem import Problem
 from idbench.identify.estimators.solution import OfWhitenedRows
+from idbench.identify.models import require_torques_once
 from idbench.identify.rows.factors import Factor, Status, prior_rows
 
 
@@ -70,6 +71,7 @@ class GeneralizedLeastSquares(AbstractEstimator):
 
     def solve(self, problem: Problem) -> Estimate:
         """Return the estimate; of logs too long for their rows to be kept, pieces count as independent."""
+        require_torques_once(problem.model, problem.basis.n)
         R = problem.independent_factor
         known = None if problem.prior is None else prior_rows(problem.prior, R, np.ones(R.shape[:-2]))
         factor = Factor(R, problem.factors.together.rows, problem.names, known)
