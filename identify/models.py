@@ -211,16 +211,11 @@ class ExplicitAndPowerModel(AbstractModel):
 
     def c(self, basis: Basis, state: State) -> Columns:
         """Return D(q, qd, qdd), and below it the dissipated power."""
-        return {**basis.explicit(state), **_below(state.n, basis.dissipation(state))}
+        return {**basis.explicit(state), **{(state.n, p): x for (_, p), x in basis.dissipation(state).items()}}
 
     def e(self, basis: Basis, state: State) -> Columns:
         """Return the energies h(q, qd), in the last row."""
-        return _below(state.n, basis.energy(state))
-
-
-def _below(n: int, columns: Columns) -> Columns:
-    """Return the columns of one row as those of row n."""
-    return {(n, place): column for (_, place), column in columns.items()}
+        return {(state.n, p): x for (_, p), x in basis.energy(state).items()}
 
 
 THREE = ("explicit", "implicit", "power")  # The paper's models, which are compared where no other is asked for

@@ -39,6 +39,8 @@ def test_a_sample_of_a_kept_figure_is_what_the_program_gives(remake, name):
 def test_a_number_that_changes_is_seen(remake):
     kept = {"encoder.lines 256, GLS": [0.8, 97.0, 3.5, 0.07], "OLS": [1.0]}
     assert remake.changed(kept, {**kept}) == []
+    assert remake.changed({"OLS": [1.0, None]}, {"OLS": [1.0, None]}) == []
+    assert remake.changed({"OLS": [1.0, None]}, {"OLS": [1.0, 2.0]}) == ["OLS"]
     assert remake.changed(kept, {**kept, "OLS": [1.03]}) == ["OLS"]
     assert remake.changed(kept, {"encoder.lines 256, GLS": [0.8, 97.0, 3.5, 0.07]}) == ["OLS"]
     assert remake.changed(kept, {**kept, "encoder.lines 256, GLS": [0.8, 100.0, 3.5, 0.07]}) == ["encoder.lines 256, GLS"]

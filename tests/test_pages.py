@@ -164,6 +164,6 @@ def test_the_pendulum_of_the_docs_is_identified_by_all_models(root):
     qdd = -3.6 * np.sin(2 * t) - 5.766 * np.sin(3.1 * t)
     tau = 0.8 * qdd + 9.81 * (1.2 * np.cos(q) + 0.1 * np.sin(q)) + 0.3 * qd + 0.5 * np.sign(qd)
     log = MotionLog(100.0, q[:, None], tau[:, None], TorqueChannel("instantaneous"))
-    models = {name: MODELS.create(name) for name in MODELS.builtin}
+    models = {name: MODELS.create(name) for name in MODELS.builtin if name != "explicit+power"}  # which GLS refuses
     for estimate in identify_each(log, page["pendulum"], models).values():
         np.testing.assert_allclose(estimate.X, [0.8, 1.2, -0.1, 0.3, 0.5], rtol=1e-4)

@@ -31,8 +31,9 @@ RUNS = 2  # Of a sample: its numbers are compared with those of the same runs, n
 ESTIMATORS, MODELS, LOGS = 2, 3, 2  # Of a sample, the first, of no more logs: others simulate for minutes
 SOURCES = ("models", "sim", "identify", "experiments/study", "experiments/paper", "experiments/identification")
 
-FAR = 6.0
-"""Typical error of two runs over that of many: ln|x| of a normal error scatters by 1.1, and parameters of a run go together."""
+FAR, BELOW = 6.0, 20.0
+"""Typical error of two runs over that of many, and below it: ln|x| of a normal error scatters by 1.1, parameters of a run go
+together, and the rms of many is that of the worst of them."""
 
 ALIKE = 0.01  # Of numbers of the same runs: another machine may round an encoder's count the other way, now and then
 
@@ -84,7 +85,7 @@ def sample(name: str) -> dict[str, list[float]]:
         for cell in table.cells
         if cell.runs
     }
-    return {label: short([float(x) for x in off]) for label, off in errors.items()}
+    return {label: short([float(x) if np.isfinite(x) else None for x in off]) for label, off in errors.items()}
 
 
 def _first(axis: Any) -> Any:
@@ -116,7 +117,7 @@ def apart(name: str, found: Mapping[str, list[float]]) -> tuple[str, float] | No
     if name == "table2":
         kept = json.loads((RESULTS / "table2.json").read_text())["attribution_percent"]
         every = {f"{cause}, {form}": errors for cause, of in kept.items() for form, errors in of.items()}
-        limit = 1.005  # Nothing is drawn: five digits are kept
+        above = below = 1.005  # Nothing is drawn: five digits are kept
     elif name in OTHERS or not (RESULTS / f"{name}.json").is_file():
         return None
     else:
@@ -125,13 +126,13 @@ def apart(name: str, found: Mapping[str, list[float]]) -> tuple[str, float] | No
             _label(cell["settings"], cell["chain"], cell["estimator"], cell["model"]): [x or 0.0 for x in cell["rmse_percent"]]
             for cell in rows
         }
-        limit = FAR
+        above, below = FAR, BELOW
     if every and not every.keys() & found.keys():
         return "no sample is of the kept figure, whose typical error", float("nan")
     for label, errors in found.items():
         if label in every and (both := [(a, b) for a, b in zip(errors, every[label], strict=True) if a and b]):
             ratio = float(np.exp(np.mean([np.log(abs(a / b)) for a, b in both])))
-            if not 1 / limit < ratio < limit:
+            if not 1 / below < ratio < above:
                 return label, ratio
     return None
 
@@ -139,12 +140,12 @@ def apart(name: str, found: Mapping[str, list[float]]) -> tuple[str, float] | No
 def changed(kept: Mapping[str, list[float]], found: Mapping[str, list[float]]) -> list[str]:
     """Return the samples that are not what is kept, to `ALIKE` of each number and of the typical one beside it."""
     every = {label: (kept.get(label, []), found.get(label, [])) for label in {**kept, **found}}
-    return [label for label, (a, b) in every.items() if len(a) != len(b) or not _alike(np.array(a), np.array(b))]
+    return [label for label, (a, b) in every.items() if len(a) != len(b) or not _alike(np.array(a, float), np.array(b, float))]
 
 
 def _alike(a: Array, b: Array) -> bool:
-    limit = ALIKE * (np.abs(a) + np.median(np.abs(a)))
-    return bool((np.abs(a - b) <= limit).all())
+    unknown = np.isnan(a) & np.isnan(b)  # where the truth is 0
+    return bool(((np.abs(a - b) <= ALIKE * (np.abs(a) + np.nanmedian(np.abs(a)))) | unknown).all())
 
 
 def digest() -> str:
