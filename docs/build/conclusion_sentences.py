@@ -166,16 +166,16 @@ def _on_tables() -> Iterator[Finding]:
     yield (
         "Without noise the errors of the three models are close, with a little advantage for the explicit one.",
         f"**Close here, but not in Table 1.** There the implicit model's errors are {masked['implicit']['paper']:.2g} times "
-        f"the explicit one's, all eight larger. Here {bare['implicit']['median']:.2g} times, with reversals masked "
-        f"{masked['implicit']['median']:.2g}; of {count} motions {masked['implicit']['all_larger']:.0%} have all eight larger. "
+        f"the explicit one's, all eight larger. Here {bare['implicit']['median']:#.2g} times, with reversals masked "
+        f"{masked['implicit']['median']:#.2g}; all eight are larger in {100 * masked['implicit']['all_larger']:.0f} % of {count} motions. "
         f"No step that we tried gives both (below). With reversals masked the implicit errors are the paper's "
         f"({none['over_paper']:.2g} times); the paper's explicit ones are smaller.",
         "table1 --motions 2000",
     )
     yield (
         f"In Table 1 the power model's errors are {masked['power']['paper']:.2g} times the explicit one's.",
-        f"**Reversals were masked.** {bare['power']['reached']:.0%} of the motions reach that without the mask, "
-        f"{masked['power']['reached']:.0%} with it.",
+        f"**Reversals were masked.** {100 * bare['power']['reached']:.0f} % of the motions reach that without the mask, "
+        f"{100 * masked['power']['reached']:.0f} % with it.",
         "table1 --motions 2000",
     )
     yield (
