@@ -167,7 +167,8 @@ def _on_tables() -> Iterator[Finding]:
         "Without noise the errors of the three models are close, with a little advantage for the explicit one.",
         f"**Close here, but not in Table 1.** There the implicit model's errors are {masked['implicit']['paper']:.2g} times "
         f"the explicit one's, all eight larger. Here {bare['implicit']['median']:#.2g} times, with reversals masked "
-        f"{masked['implicit']['median']:#.2g}; all eight are larger in {100 * masked['implicit']['all_larger']:.0f} % of {count} motions. "
+        f"{masked['implicit']['median']:#.2g}; "
+        f"all eight are larger in {100 * masked['implicit']['all_larger']:.0f} % of {count} motions. "
         f"No step that we tried gives both (below). With reversals masked the implicit errors are the paper's "
         f"({none['over_paper']:.2g} times); the paper's explicit ones are smaller.",
         "table1 --motions 2000",
