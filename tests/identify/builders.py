@@ -6,7 +6,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from idbench.identify import BaseParameters, KinematicTree, MotionLog, State, tree_basis
+from idbench.identify import MODELS, BaseParameters, KinematicTree, MotionLog, State, tree_basis
 from idbench.identify.servo import JointLoad
 from idbench.sim.encoders import IncrementalEncoder
 from idbench.sim.engine.simulation import simulate
@@ -16,6 +16,8 @@ from idbench.sim.scenario.scenario_file import load
 from idbench.sim.trajectories import RandomMoves
 
 EPS = 1e-30
+
+SOLVED = [name for name in MODELS.builtin if name != "explicit+power"]  # By GLS, which refuses rows that repeat torques
 
 
 class Arm(NamedTuple):

@@ -6,7 +6,7 @@ from importlib.metadata import files
 
 import numpy as np
 import pytest
-from builders import arm, at, matrix
+from builders import SOLVED, arm, at, matrix
 
 import idbench.identify.parameters.base_parameters
 from idbench.identify import (
@@ -115,7 +115,7 @@ def test_the_scaras_tree_spans_its_closed_form_and_gives_the_same_estimates(log,
     T = np.linalg.lstsq(mine, closed, rcond=None)[0]
     np.testing.assert_allclose(mine @ T, closed, atol=1e-12)
     assert np.linalg.cond(T) < 10
-    models = {name: MODELS.create(name) for name in MODELS.builtin}
+    models = {name: MODELS.create(name) for name in SOLVED}
     by_tree, by_form = identify_each(log, found.basis, models), identify_each(log, scara(), models)
     for name, estimate in by_form.items():
         np.testing.assert_allclose(T @ estimate.X, by_tree[name].X, rtol=1e-9)
@@ -129,7 +129,7 @@ def test_ideal_data_give_every_base_parameter_in_all_models(robot):
     made, _, found, standard = arm(robot)
     moves = RandomMoves(moves=25, durations=(0.9, 1.5), velocity=(2.0,), rest=1.0)
     log, X = ideal_log(made, moves.sample(made, 200.0)), found.base(standard)
-    models = {name: MODELS.create(name) for name in MODELS.builtin}
+    models = {name: MODELS.create(name) for name in SOLVED}
     for name, estimate in identify_each(log, found.basis, models, idbench_chain()).items():
         weight = np.linalg.norm(estimate.rows.W, axis=0) / np.linalg.norm(estimate.rows.Y)
         assert np.abs((estimate.X - X) * weight).max() < 1e-5, name  # shares of the torque that errors make

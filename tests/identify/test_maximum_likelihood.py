@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from builders import noisy
+from builders import SOLVED, noisy
 
 from idbench.identify import (
     MODELS,
@@ -156,7 +156,7 @@ def test_two_logs_are_worth_two(exact):
 
 def test_other_models_are_refused_and_leave_the_explicit_one(exact):
     problem = Problem((noisy(run(exact, 0), BITS16, 0.0),), scara(), EXPLICIT, idbench_chain())
-    found = attempt_each(problem, {name: MODELS.create(name) for name in MODELS.builtin}, ML)
+    found = attempt_each(problem, {name: MODELS.create(name) for name in SOLVED}, ML)
     assert found["explicit"].X.shape == (8,)
     assert "--model explicit, or GLS" in str(found["power"])
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from builders import dense, noisy
+from builders import SOLVED, dense, noisy
 
 from idbench.identify import (
     ESTIMATORS,
@@ -31,13 +31,13 @@ from idbench.identify.noise.linearization import Linearization
 from idbench.identify.noise.propagation import position_paths, torque_paths
 
 CHANNELS = [TorqueChannel("instantaneous"), TorqueChannel("held", 0.003), TorqueChannel("averaged", -0.004)]
-EVERY = {name: MODELS.create(name) for name in MODELS.builtin}
+EVERY = {name: MODELS.create(name) for name in SOLVED}
 DRAWS = 300
 
 STAGES = [("fir", channel) for channel in CHANNELS] + [(name, CHANNELS[1]) for name in OPERATORS.builtin if name != "fir"]
 """Operators and torques follow each other: every one of both, not all pairs."""
 
-WAYS = [(*stage, "explicit") for stage in STAGES] + [(*STAGES[1], model) for model in MODELS.builtin if model != "explicit"]
+WAYS = [(*stage, "explicit") for stage in STAGES] + [(*STAGES[1], model) for model in SOLVED if model != "explicit"]
 """So do models."""
 
 
