@@ -3,6 +3,7 @@
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import ClassVar
 
 import mujoco
@@ -39,7 +40,7 @@ class Task:
         """The nominal robot of every simulation."""
         return InverseDynamics(self.nominal, self.nsim, self.vary)
 
-    @property
+    @cached_property
     def inertia(self) -> Array:
         """Inertia that each joint's motor sees when the motion starts [kg m^2], shape (1 or nsim, joint)."""
         at = np.atleast_2d(self.reference.q[0])
@@ -47,7 +48,7 @@ class Task:
             return self.model.inertia(at + np.zeros((self.nsim, 1)))
         return InverseDynamics(self.nominal, len(at)).inertia(at)
 
-    @property
+    @cached_property
     def feedforward(self) -> Array:
         """Torque of the nominal robot along the planned motion, without Coulomb friction [N m].
 

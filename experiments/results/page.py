@@ -54,7 +54,7 @@ def runs_of(what: str, todo: int) -> Iterator[Callable[[float], None]]:
 
     def receive(done: float) -> None:
         rate = done / max(time.monotonic() - start, 1e-9)
-        rest = f", {rate:.3g} runs/s, {(todo - done) / rate:.0f} s left" if done else ""
+        rest = f", {rate:.3g} runs/s, {(todo - done) / rate:.0f} s left" if done >= 1 else ""
         told(f"{done:.0f} of {todo} runs{rest}", done / todo)
 
     with stages_of(what) as told:

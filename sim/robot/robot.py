@@ -90,7 +90,8 @@ class Robot:
         try:
             return Path(name) if Path(name).suffix in FILES else models.path(name)
         except KeyError as error:
-            hint = did_you_mean(name, models.names())
+            beside = (str(path) for path in Path(name).parent.glob("*") if path.suffix in FILES)
+            hint = did_you_mean(name, [*models.names(), *beside])
             raise RobotError(f"{error.args[0]}{hint}, or give the path of an MJCF or URDF file ({', '.join(FILES)})") from None
 
     @staticmethod
