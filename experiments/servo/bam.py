@@ -64,12 +64,12 @@ def device_of_bam(path: Path) -> dict[str, Any]:
     values = {"a": a, "b": numbers["kt"] * a, "Fs": 0.0, "Fv": 0.0, "delay": 0.0}
     values |= {letter: numbers[name] for name, letter in BAM.items() if name in numbers and letter in own}
     units = {x: parameter.unit for x, parameter in SERVO_PARAMETERS.items() if x in values}
-    ratio = numbers.get("error_gain_ratio", 1.0)
     published = {name.lower().replace("-", ""): name for name in PUBLISHED}.get(given.get("actuator"))
+    gain = numbers.get("error_gain_ratio", 1.0) * (PUBLISHED[published].gain if published else 1.0)
     return {
         "name": path.stem,
         "source": f"{path}, BAM {given['model']} of {given.get('actuator')}",
-        "known": {"model": published, "gain": ratio * PUBLISHED[published].gain} if published else {},
+        "known": {"model": published, "gain": gain} if published else {},
         "friction": law,
         "parameters": {x: {"value": values[x], "sigma": None, "spread": None, "unit": unit} for x, unit in units.items()},
         "beyond": {name: x for name, x in numbers.items() if name not in (*BAM, *RIG) and x and x != NONE.get(name)},

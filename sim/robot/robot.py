@@ -90,8 +90,7 @@ class Robot:
         try:
             return Path(name) if Path(name).suffix in FILES else models.path(name)
         except KeyError as error:
-            beside = (str(path) for path in Path(name).parent.glob("*") if path.suffix in FILES)
-            hint = did_you_mean(name, [*models.names(), *beside])
+            hint = did_you_mean(name, [*models.names(), *(str(x) for x in Path(name).parent.glob("*") if x.suffix in FILES)])
             raise RobotError(f"{error.args[0]}{hint}, or give the path of an MJCF or URDF file ({', '.join(FILES)})") from None
 
     @staticmethod
