@@ -29,7 +29,6 @@ TITLE = "What each fault looks like"
 
 SCENARIOS = {
     "ideal": ("overview", "Nothing: residuals of the size of the noise."),
-    "brisk": ("overview", "Fast moves: torques reach further, the residuals stay flat."),
     "quantization": ("overview", "Coarse encoders: residuals are rough wherever a joint moves."),
     "ripple": ("friction", "Cogging: residuals over the position are a wave, once per slot."),
     "saturation": ("overview", "Pink: the drive is at its limit, and the logged torque is not the one that acted."),
