@@ -54,7 +54,9 @@ def write_summary(path: Path, summary: dict[str, Any]) -> None:
 
 def summarize(estimate: Estimate, truth: list[float] | None) -> dict[str, Any]:
     """Return one model's entry of a summary: estimate, error if known, standard errors, Cond(W), rows, residual."""
+    each = zip(estimate.names, estimate.X, estimate.standard_errors, estimate.problem.basis.units, strict=True)
     return {
+        "parameters": {name: {"value": finite(x), "sigma": finite(s), "unit": unit} for name, x, s, unit in each},
         "estimate": estimate.X.tolist(),
         "relative_error_percent": None if truth is None else [finite(x) for x in estimate.relative_error_percent(truth)],
         "sigma": [finite(x) for x in estimate.standard_errors],

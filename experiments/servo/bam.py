@@ -50,9 +50,7 @@ def device_of_bam(path: Path) -> dict[str, Any]:
         given = json.loads(path.read_text(encoding="utf-8"))
         if given.get("model") not in LAWS or [name for name in MOTOR if name not in given]:
             raise ValueError(f"model must be one of {', '.join(LAWS)}, of a motor with {', '.join(MOTOR)}")
-        ours = {name: given.get(name) for name in (*BAM, *NONE, *RIG) if name not in ("model", "actuator")}
-        more = {name: x for name, x in given.items() if isinstance(x, int | float)}
-        numbers = {name: float(x) for name, x in (ours | more).items() if x is not None}
+        numbers = {name: float(x) for name, x in given.items() if isinstance(x, int | float) or name in (*BAM, *MOTOR)}
         require_positive(**{name: numbers[name] for name in MOTOR}, max_velocity=numbers.get("max_velocity", 1.0))
         require_not_negative(**{name: x for name, x in numbers.items() if name != "q_offset"})
         if (delay := numbers.get("command_delay", 0.0)) > LATEST:
