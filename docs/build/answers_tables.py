@@ -83,16 +83,20 @@ def _value(x: Any, key: str) -> str:
     return f"{log2(4 * x):g} bits" if key == "encoder.lines" else x if isinstance(x, str) else f"{x:g}"
 
 
+def _two(x: float) -> str:
+    return f"{x:.0f}" if x >= 100 else f"{x:#.2g}"
+
+
 def implicit_steps() -> Iterator[str]:
     """Yield what changes of one step of the chain make of the implicit model's errors over the explicit one's."""
     found = json.loads((RESULTS / "implicit-steps.json").read_text())
     rows = (
         [
             row["step"],
-            f"{row['ratio']:.2g} ({row['low']:.2g} to {row['high']:.2g})",
-            f"{row['reached']:.0%}",
-            f"{row['all_larger']:.0%}",
-            f"{row['over_paper']:.2g}",
+            f"{_two(row['ratio'])} ({_two(row['low'])} to {_two(row['high'])})",
+            f"{100 * row['reached']:.0f} %",
+            f"{100 * row['all_larger']:.0f} %",
+            _two(row["over_paper"]),
         ]
         for row in found
     )
