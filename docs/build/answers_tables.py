@@ -84,7 +84,7 @@ def _value(x: Any, key: str) -> str:
 
 
 def _two(x: float) -> str:
-    return f"{x:.0f}" if x >= 100 else f"{x:#.2g}"
+    return f"{x:.0f}" if x >= 10 else f"{x:#.2g}"
 
 
 def implicit_steps() -> Iterator[str]:
