@@ -267,7 +267,7 @@ def test_every_way_ends_with_a_result(real, way, tmp_path, monkeypatch, capsys):
     assert not code, capsys.readouterr().err
     assert all(Path(file).stat().st_size for file in words if file.startswith(("a.", "b.", "c.", "d.")))
     shown = capsys.readouterr().out
-    word = re.search(r"Result: (good|fair|unsure|poor) ", shown)
+    word = re.search(r"Result: (good|fair|unsure|poor)\b", shown)
     assert word
     # A law that the robot does not have, on all joints, may cost a joint its verdict; the verdict says so.
     assert word[1] == "good" or way == "stribeck"
