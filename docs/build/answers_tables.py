@@ -69,7 +69,7 @@ def smallest(study: str) -> Callable[[], Iterator[str]]:
 
     def made() -> Iterator[str]:
         found = _by(study, key, "pace")
-        ways = [(pace, model) for model in ("explicit", "implicit", "power") for pace in PACES]
+        ways = [(pace, model) for model in ("explicit", "power") for pace in PACES]
         rows = (
             [_value(x, key), *(typical(found[x, pace, "idbench", "GLS", model]) for pace, model in ways)]
             for x in _firsts(found, 0)
