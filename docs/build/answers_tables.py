@@ -8,6 +8,8 @@ from typing import Any
 
 from results import RESULTS, Cell, cells, table, typical
 
+from idbench.experiments.paper.table1 import PAPER
+
 NOISES = {
     "none": "none",
     "torque": "white torque noise",
@@ -17,6 +19,7 @@ NOISES = {
     "friction": "Stribeck friction",
 }
 MOVES = {"fifth-order": "fifth-order", "ruckig": "ruckig", "ruckig-fastest": "ruckig, fastest"}
+WAYS = ("idbench", "GLS", "explicit"), ("idbench", "GLS", "power"), ("paper_masked", "OLS", "explicit")
 PACES = {"slow": "2.6 s", "usual": "1.3 s", "fast": "0.8 s"}
 CHAINS = {"paper": ("#b5651d", "the paper's steps"), "paper_masked": ("#2f6f9f", "the same, reversals left out")}
 COLORS = {"explicit": "#2ca02c", "power": "#d62728"}
@@ -53,14 +56,13 @@ def explicit_power() -> Iterator[str]:
 def moves() -> Iterator[str]:
     """Yield typical errors [%] by motion: explicit and power in chain idbench by GLS, and in the paper's masked by OLS."""
     found = _by("moves", "noise", "moves")
-    ways = [("idbench", "GLS", "explicit"), ("idbench", "GLS", "power"), ("paper_masked", "OLS", "explicit")]
 
     def rows() -> Iterator[Sequence[str]]:
         for noise in _firsts(found, 0):
             for motion, name in MOVES.items():
-                yield [NOISES[noise], name, *(typical(found[noise, motion, *way]) for way in ways)]
+                yield [NOISES[noise], name, *(typical(found[noise, motion, *way]) for way in WAYS)]
 
-    yield from table(["imperfection", "moves", *(f"{m}, {chain}, {e}" for chain, e, m in ways)], rows())
+    yield from table(["imperfection", "moves", *(f"{m}, {chain}, {e}" for chain, e, m in WAYS)], rows())
 
 
 def smallest(study: str) -> Callable[[], Iterator[str]]:
@@ -110,7 +112,7 @@ def table1_motions() -> Iterator[str]:
     def rows() -> Iterator[Sequence[str]]:
         for model in ("explicit", "power"):
             paper = found["paper_percent"][model]
-            yield [f"the paper, {model}", *(f"{x:.3f}" for x in paper), "28" if model == "explicit" else "93", "", ""]
+            yield [f"the paper, {model}", *(f"{x:.3f}" for x in paper), f"{PAPER[model].condition_number:g}", "", ""]
             for chain, of in found["chains"].items():
                 own = of["models"][model]
                 inside = sum(sum(each["explained"]) for each in of["models"].values())
@@ -122,87 +124,69 @@ def table1_motions() -> Iterator[str]:
     yield from table(["", *found["parameters"], "Cond(W)", "motions kept", "inside"], rows())
 
 
-def draw_smallest(place: Path) -> None:
-    """Draw typical errors over ripple, counts and delay, of two models and three paces."""
-    import numpy as np
+def _panels(titles: Sequence[str], height: float) -> Sequence[Any]:
+    """Return panels beside each other with logarithmic axes of errors."""
     from matplotlib.figure import Figure
 
     import idbench.experiments.reports.drawn  # noqa: F401  # letters as in reports
 
-    figure = Figure(figsize=(11, 3.8), layout="constrained")
-    panels = figure.subplots(1, len(SMALLEST), sharey=True)
-    for panel, (study, (key, head)) in zip(panels, SMALLEST.items(), strict=True):
+    panels = Figure(figsize=(11, height), layout="constrained").subplots(1, len(titles), sharey=True)
+    for panel, title in zip(panels, titles, strict=True):
+        panel.set_yscale("log")
+        panel.set_title(title, loc="left", fontsize=11)
+        panel.grid(axis="y", color="0.9")
+        panel.spines[["top", "right"]].set_visible(False)
+    return panels
+
+
+def _saved(panels: Sequence[Any], what: str, place: Path) -> None:
+    panels[0].set_ylabel(what)
+    figure = panels[0].figure
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False, fontsize=9)
+    figure.savefig(place, dpi=110)
+
+
+def draw_smallest(place: Path) -> None:
+    """Draw typical errors over ripple, counts and delay, of two models and three paces."""
+    panels = _panels([head for _, head in SMALLEST.values()], 3.8)
+    for panel, (study, (key, _)) in zip(panels, SMALLEST.items(), strict=True):
         found = _by(study, key, "pace")
         values = _firsts(found, 0)
-        at = np.arange(len(values))
         for model, color in COLORS.items():
             for pace, style in zip(PACES, (":", "-", "--"), strict=True):
                 y = [float(typical(found[x, pace, "idbench", "GLS", model])) for x in values]
-                panel.plot(at, y, style, color=color, marker="o", markersize=3, label=f"{model}, moves of {PACES[pace]}")
-        panel.set_yscale("log")
-        panel.set_xticks(at, [_value(x, key) for x in values], rotation=30)
-        panel.set_title(head, loc="left", fontsize=11)
-        panel.grid(axis="y", color="0.9")
-        panel.spines[["top", "right"]].set_visible(False)
-    panels[0].set_ylabel("typical error [%]")
-    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False, fontsize=9)
-    figure.savefig(place, dpi=110)
+                panel.plot(y, style, color=color, marker="o", markersize=3, label=f"{model}, moves of {PACES[pace]}")
+        panel.set_xticks(range(len(values)), [_value(x, key) for x in values], rotation=30)
+    _saved(panels, "typical error [%]", place)
 
 
 def draw_moves(place: Path) -> None:
     """Draw typical errors of fifth-order moves and of ruckig's, by imperfection."""
-    import numpy as np
-    from matplotlib.figure import Figure
-
-    import idbench.experiments.reports.drawn  # noqa: F401  # letters as in reports
-
     found = _by("moves", "noise", "moves")
     noises = _firsts(found, 0)
-    figure = Figure(figsize=(11, 3.8), layout="constrained")
-    ways = (("idbench", "GLS", "explicit"), ("idbench", "GLS", "power"), ("paper_masked", "OLS", "explicit"))
-    panels = figure.subplots(1, len(ways), sharey=True)
-    for panel, way in zip(panels, ways, strict=True):
+    panels = _panels([f"{model} model, chain {chain}, {estimator}" for chain, estimator, model in WAYS], 3.8)
+    for panel, way in zip(panels, WAYS, strict=True):
         for k, (motion, name) in enumerate(MOVES.items()):
             y = [float(typical(found[noise, motion, *way])) for noise in noises]
-            panel.plot(np.arange(len(noises)) + 0.15 * (k - 1), y, "osD"[k], label=name)
-        panel.set_yscale("log")
+            panel.plot([i + 0.15 * (k - 1) for i in range(len(noises))], y, "osD"[k], label=name)
         panel.set_xticks(range(len(noises)), [NOISES[noise] for noise in noises], rotation=25, ha="right")
-        panel.set_title(f"{way[2]} model, chain {way[0]}, {way[1]}", loc="left", fontsize=11)
-        panel.grid(axis="y", color="0.9")
-        panel.spines[["top", "right"]].set_visible(False)
-    panels[0].set_ylabel("typical error [%]")
-    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False, fontsize=9)
-    figure.savefig(place, dpi=110)
+    _saved(panels, "typical error [%]", place)
 
 
 def draw_motions(place: Path) -> None:
     """Draw the medians and bands of Table 1's errors over random motions beside the paper's."""
-    import numpy as np
-    from matplotlib.figure import Figure
-
-    import idbench.experiments.reports.drawn  # noqa: F401  # letters as in reports
-
     found = json.loads((RESULTS / "table1-motions.json").read_text())
     names, paper = found["parameters"], found["paper_percent"]
-    figure = Figure(figsize=(12, 4.6), layout="constrained")
-    axes = figure.subplots(1, len(paper), sharey=True)
-    for panel, model in zip(axes, paper, strict=True):
-        at = np.arange(len(names))
+    panels = _panels([f"{model} model" for model in paper], 4.6)
+    for panel, model in zip(panels, paper, strict=True):
         for k, (chain, (color, label)) in enumerate(CHAINS.items()):
-            of = found["chains"][chain]["models"][model]
-            x = at + 0.24 * (k - 0.5)
+            of, x = found["chains"][chain]["models"][model], [i + 0.24 * (k - 0.5) for i in range(len(names))]
             panel.vlines(x, of["low_percent"], of["high_percent"], color=color, linewidth=5, alpha=0.45)
             panel.plot(x, of["median_percent"], "o", color=color, markersize=4, label=label)
-        panel.plot(at, paper[model], "kx", markersize=7, markeredgewidth=1.8, label="the paper")
-        panel.set_yscale("log")
+        panel.plot(paper[model], "kx", markersize=7, markeredgewidth=1.8, label="the paper")
         panel.set_ylim(5e-4, 50)
-        panel.set_xticks(at, names)
-        panel.set_title(f"{model} model", loc="left", fontsize=11)
-        panel.grid(axis="y", color="0.9")
-        panel.spines[["top", "right"]].set_visible(False)
-    axes[0].set_ylabel("error [%]: median, and 5 to 95 % of the motions")
-    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper left", ncols=3, frameon=False)
-    figure.savefig(place, dpi=110)
+        panel.set_xticks(range(len(names)), names)
+    _saved(panels, "error [%]: median, and 5 to 95 % of the motions", place)
 
 
 ANSWERS_TABLES: dict[str, Callable[[], Iterator[str]]] = {

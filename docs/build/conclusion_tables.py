@@ -50,7 +50,6 @@ def _cell(row: Ratio | None) -> str:
 def _of_models(study: str, first: str = "noise") -> Iterator[str]:
     """Yield ratios with their intervals, a row for each noise, chain and estimator."""
     found = {(r["settings"]["noise"], r["chain"], r["estimator"], *r["models"]): r for r in ratios(study)}
-    pairs = [pair for pair in PAIRS if any(key[3:] == pair for key in found)]
 
     def rows() -> Iterator[Sequence[str]]:
         for noise, chain, estimator in dict.fromkeys(key[:3] for key in found):
@@ -58,10 +57,10 @@ def _of_models(study: str, first: str = "noise") -> Iterator[str]:
                 NOISES[noise],
                 chain,
                 estimator,
-                *(_cell(found.get((noise, chain, estimator, *pair))) for pair in pairs),
+                *(_cell(found.get((noise, chain, estimator, *pair))) for pair in PAIRS),
             ]
 
-    yield from table([first, "chain", "estimator", *(f"{a} / {b}" for a, b in pairs)], rows())
+    yield from table([first, "chain", "estimator", *(f"{a} / {b}" for a, b in PAIRS)], rows())
 
 
 def _many_joints() -> Iterator[str]:

@@ -2,8 +2,8 @@
 
     uv run python docs/build/gallery.py [--said | --page] [NAME ...]
 
-Every picture is a run's recording in rerun's viewer; faults are those of the study `faults`, one size above where the doctor
-names them. With names only these are made anew, with `--said` without their pictures, with `--page` none: the page is written
+Every picture is a run's recording in rerun's viewer; faults are those of the study `faults`, of its largest
+size. With names only these are made anew, with `--said` without their pictures, with `--page` none: the page is written
 from what docs/gallery has.
 """
 

@@ -35,6 +35,8 @@ def keep(folder: Path) -> None:
         summary = json.loads(path.read_text())
         if "attribution_percent" in summary:
             kept = {name: summary[name] for name in ("parameters", "attribution_percent")}
+            models = summary["paper_processing"]
+            kept["paper_sigma"] = {model: short(models[model]["paper_sigma"]) for model in models}
             (RESULTS / f"{path.parent.name}.json").write_text(json.dumps(kept, indent=1) + "\n")
             continue
         named = ("settings", "runs", "named", "misnamed")

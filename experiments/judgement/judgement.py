@@ -16,6 +16,7 @@ from idbench.experiments.judgement.held_out import FAIR, GOOD, WORDS, HeldOut, V
 from idbench.experiments.judgement.warnings import DELAY, LOG, MODEL
 from idbench.experiments.note import noted
 from idbench.experiments.text import error_percentage
+from idbench.identify.models import THREE
 
 
 @dataclass(frozen=True)
@@ -158,7 +159,7 @@ def _finding(judgement: Judgement, causes: Sequence[Cause]) -> str:
     if one is None or verdict is None:
         return "Result: not validated"
     model = one.fit.leading
-    result = f"Result: {verdict.word}{'' if model == 'explicit' else f' ({model} model)'}:"
+    result = f"Result: {verdict.word}{'' if model == THREE[0] else f' ({model} model)'}:"
     if verdict.wrong:
         return f"{result} {verdict.wrong[0].finding}"
     worst = _worst(one)

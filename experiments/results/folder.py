@@ -10,7 +10,6 @@ from pathlib import Path
 from idbench.experiments.errors import REPORT, ResultsError
 from idbench.experiments.results.writing import NAME, Manifest, Read, WrittenFile, digest, exchange, hidden_folder, locked
 
-BUSY = "wait for it, or choose another --out"
 RECORDING = "recording.rrd"  # The recording to which identifications add their layers
 
 COMMON = ("summary.json", RECORDING, "recording.*.rrd", "log*.parquet", REPORT)
@@ -85,8 +84,9 @@ class ResultsFolder:
         made = [folder for folder in (self.out, *self.out.parents) if not folder.exists()]  # the innermost first
         with self._writing():
             self.out.mkdir(parents=True, exist_ok=True)
+        busy = f"another process is writing its results to {self.out}: wait for it, or choose another --out"
         try:
-            with locked(self.out, ResultsError(f"another process is writing its results to {self.out}: {BUSY}")):
+            with locked(self.out, ResultsError(busy)):
                 yield
         finally:
             for folder in made:  # where nothing came into them

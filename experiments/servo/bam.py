@@ -26,7 +26,7 @@ NONE = {"load_friction_motor_stribeck": 0.0, "load_friction_external_stribeck": 
 """What its laws have beyond ours, and the values at which they are ours."""
 
 MOTOR = "kt", "R", "armature"
-RIG = "q_offset", "model", "actuator", *MOTOR, "error_gain_ratio"  # Read otherwise, or of the bench that it was measured on
+RIG = "q_offset", *MOTOR, "error_gain_ratio"  # Read otherwise, or of the bench that it was measured on
 
 
 def bam_of(fit: ServoFit, model: str) -> tuple[str, list[str]]:
@@ -50,8 +50,8 @@ def device_of_bam(path: Path) -> dict[str, Any]:
         given = json.loads(path.read_text(encoding="utf-8"))
         if given.get("model") not in LAWS or [name for name in MOTOR if name not in given]:
             raise ValueError(f"model must be one of {', '.join(LAWS)}, of a motor with {', '.join(MOTOR)}")
-        numbers = {name: float(x) for name, x in given.items() if isinstance(x, int | float) or name in (*BAM, *MOTOR)}
-        require_positive(**{name: numbers[name] for name in MOTOR}, max_velocity=numbers.get("max_velocity", 1.0))
+        numbers = {name: float(x) for name, x in given.items() if isinstance(x, int | float) or name in (*BAM, *NONE, *RIG)}
+        require_positive(**{name: numbers.get(name, 1.0) for name in (*MOTOR, "max_velocity", "error_gain_ratio")})
         require_not_negative(**{name: x for name, x in numbers.items() if name != "q_offset"})
         if (delay := numbers.get("command_delay", 0.0)) > LATEST:
             raise ValueError(f"command_delay = {delay:g} s is longer than {LATEST:g} s")

@@ -106,9 +106,8 @@ def conclusion(found: Sequence[RatioRow]) -> str:
         )
     elif power:
         words.append(f"With equal numbers of rows, the power model's are {_span(power)} times as large")
-    if stated and (
-        papers := [row for row in _of(found, ["power", "explicit"], chain="paper", estimator="OLS") if _ripple(row)]
-    ):
+    papers = _of(power, ["power", "explicit"], chain="paper", estimator="OLS")
+    if stated and (papers := [row for row in papers if row["settings"].get("noise") == "ripple"]):
         words[-1] += f" (the paper's experiment, with ripple and in its chain: {interval(papers[0])})"
     if stated and (weighted := _of(power, ["power", "explicit"], estimator="GLS")):
         best, worst = (pick(weighted, key=lambda row: row["ratio"]) for pick in (min, max))
@@ -118,10 +117,6 @@ def conclusion(found: Sequence[RatioRow]) -> str:
 
 def _of(found: Sequence[RatioRow], pair: list[str], **given: str) -> list[RatioRow]:
     return [row for row in found if row["models"] == pair and all(row[key] == x for key, x in given.items())]
-
-
-def _ripple(row: RatioRow) -> bool:
-    return bool(row["settings"].get("noise") == "ripple")
 
 
 def _span(rows: Sequence[RatioRow]) -> str:

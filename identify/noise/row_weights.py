@@ -79,7 +79,7 @@ MIN_RATIO, MAX_RATIO = 0.01, 10.0
 
 
 def friction_bias(to_rows: RowMap, linear: Linearization, model: AbstractModel, position: Array) -> Array:
-    """Bias of W X by noise of the velocities where joints hardly move, shape (..., r).
+    """Bias of W X by noise of the velocities where joints hardly move, in rows of power alone, shape (..., r).
 
     Friction turns noise into power, Fs |qd|, of one sign: that of a velocity of E|qd + noise| - |qd|. `position` is the
     standard deviation of the positions' noise [rad], shape (..., joint).

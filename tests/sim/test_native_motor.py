@@ -13,8 +13,11 @@ from idbench.sim.robot.robot import Robot
 from idbench.sim.scenario.scenario_file import load
 from idbench.sim.trajectories import RandomMoves
 
-MOTORS = {"motor1": (3.0, 5.0, 0.012), "motor2": (6.0, 1.5, 0.015)}
-"""R [Ohm], K [N m/A] and L [H] of models/scara/scara.xml."""
+
+def motors():
+    """R [Ohm], K [N m/A] and L [H] of the SCARA's motors, shape (joint,) each."""
+    found = Robot.load("scara").motors
+    return found.R, found.K, found.L
 
 
 def native(h):
@@ -23,8 +26,8 @@ def native(h):
     spec.option.timestep, spec.option.integrator = h, mujoco.mjtIntegrator.mjINT_EULER
     for motor in list(spec.actuators):
         spec.delete(motor)
-    for name, (R, K, L) in MOTORS.items():
-        made = spec.add_actuator(name=name, target=f"joint{name[-1]}", trntype=mujoco.mjtTrn.mjTRN_JOINT)
+    for joint, R, K, L in zip(spec.joints, *motors(), strict=True):
+        made = spec.add_actuator(target=joint.name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
         made.set_to_dcmotor(motorconst=[K, 0.0], resistance=R, inductance=[L, 0.0])
     return spec.compile()
 
@@ -39,7 +42,7 @@ def off(run, h):
     """Rms difference of the positions [rad] where MuJoCo's motors get v = R i + L w (i_ref - i) + K qd at each of its steps."""
     model, log = native(h), run.alone()
     data, w = mujoco.MjData(model), 2 * np.pi * AveragedDrive().bandwidth
-    R, K, L = (np.array(x) for x in zip(*MOTORS.values(), strict=True))
+    R, K, L = motors()
     data.qpos[:], q = log.q[0], []
     for k in range(log.samples):
         q.append(data.qpos.copy())
@@ -54,5 +57,5 @@ def test_mujocos_own_motors_come_to_the_averaged_drive_as_their_step_falls(run):
     """Their current is half a step late: 0.5 mrad of difference at a step of half the loop's 1 / w, none at h = 0."""
     errors = [off(run, h) for h in (8e-5, 4e-5, 2e-5)]
     for wide, narrow in pairwise(errors):
-        assert 1.9 < wide / narrow < 2.1
+        assert 1.9 < wide / narrow < 2.1  # of first order; the next is some h w = 0.05 of it
     assert abs(2 * errors[2] - errors[1]) < 0.02 * errors[1]  # nothing is left of them at h = 0

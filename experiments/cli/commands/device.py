@@ -41,7 +41,8 @@ def device(options: ShowDevice) -> None:
         known = {**known, "known": {**known["known"], "supply": options.supply}}
     page.found |= known
     _print(page, known)
-    page.warn({known["name"]: [f"{name} = {x:.3g} has no place in our law" for name, x in known.get("beyond", {}).items()]})
+    beyond = known.get("beyond", {}).items()
+    page.warn({known["name"]: [f"{name} = {x:.3g} has no place in law {known['friction']}" for name, x in beyond]})
     for path in options.write:
         require_drive(known)
         text, said = servo_toml_of(known, options.kp), "what is known of it, for idbench servo --servo"

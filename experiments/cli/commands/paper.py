@@ -63,7 +63,9 @@ def search(options: SearchCommand) -> None:
     page = Page()
     with closing(page):
         with _searching() as told:
-            scenario = TrajectorySearch(options.seed, condition=options.condition).run(Robot.load("scara"), told)
+            scenario = TrajectorySearch(options.seed, condition=options.condition or TrajectorySearch.condition).run(
+                Robot.load("scara"), told
+            )
         if options.out is None:
             page.out(to_toml(scenario).rstrip("\n"))
             return

@@ -88,8 +88,8 @@ class SearchCommand(Command, called="search", action="paper:search"):
 
     seed: int = 0
     """The same seed gives the same trajectory."""
-    condition: tuple[float, float] = (28.0, 93.0)
-    """Cond(W) of the explicit and of the power model: by default of Table 1; Table 2 has 37 and 111."""
+    condition: tuple[float, float] | None = None
+    """Cond(W) of the explicit and of the power model. Default: those of Table 1; Table 2 has 37 and 111."""
     out: File = None
     """Scenario file (TOML) to write. Default: print it."""
     force: bool = False
