@@ -61,7 +61,7 @@ def held(request):
 
 @pytest.mark.thorough
 @pytest.mark.parametrize(
-    ("model", "operator"), [*((model, "fir") for model in MODELS.builtin), ("power", "windows"), ("power", "modulating")]
+    ("model", "operator"), [*((model, "fir") for model in SOLVED), ("power", "windows"), ("power", "modulating")]
 )
 def test_a_held_torque_that_says_so_is_identified(model, operator, held, truth):
     """The remaining error is RK4 at 1 ms and MuJoCo's soft friction near standstill."""
