@@ -5,8 +5,43 @@ from dataclasses import dataclass
 from importlib.metadata import version
 
 from rich.console import Console
+from rich.text import Text
 
 from idbench.experiments.text import new_table, print_titled
+
+COLORS = {"good": "green", "fair": "yellow", "poor": "red"}  # Of the verdicts
+
+
+@dataclass(frozen=True)
+class Conclusion:
+    """The first lines of every result, which terminal, report, recording and Python share."""
+
+    word: str
+    """The verdict; empty if there is none."""
+    finding: str
+    """The verdict in one sentence."""
+    step: str
+    """What to do next."""
+    why: str = ""
+    """What limits it, in a line of its own."""
+
+    def __str__(self) -> str:
+        return f"{'; '.join(filter(None, (self.finding, self.why)))}; next: {self.step}"
+
+    def show(self, console: Console) -> None:
+        """Print it."""
+        console.print(Text(self.finding, f"bold {COLORS.get(self.word, '')}".strip()), soft_wrap=True)
+        for line in filter(None, (self.why, f"next: {self.step}\n")):
+            console.print(Text(line, "bold"), soft_wrap=True)
+
+    def markdown(self, command: str) -> str:
+        """The same for a recording, with the command that makes the result again."""
+        lines = f"**{self.finding}**", self.why, f"next: {self.step}", f"`{command}`"
+        return "\n\n".join(filter(None, lines))
+
+    def summary(self) -> dict[str, str]:
+        """Its part of summary.json."""
+        return {"verdict": self.word, "finding": self.finding, "why": self.why, "next": self.step}
 
 
 @dataclass(frozen=True)
@@ -38,16 +73,16 @@ class Document:
     """What it is of."""
     subtitle: str
     """Of which robot, or by which loops."""
+    conclusion: Conclusion
+    """What it comes to, and the next step."""
     verdicts: Sequence[tuple[str, str]]
-    """Lines, each after its verdict; the first is that on the whole."""
+    """Lines on its parts, each after its verdict."""
     warnings: Mapping[str, Sequence[str]]
     """What to check, by what it is about."""
     tables: Sequence[Listing]
     """What was found."""
     notes: Sequence[str]
     """What else belongs to it: what was read and assumed."""
-    step: str = ""
-    """What to do next."""
     figures: Callable[[], Sequence[tuple[str, str]]] = tuple
     """Makes titles and SVG of its pictures."""
 

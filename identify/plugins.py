@@ -103,6 +103,14 @@ class Table(Mapping[str, Callable[[], T]], Generic[T]):
         self._objects[name] = made
         return name
 
+    def own(self, part: type[T]) -> str:
+        """Return the name of a class; the table has one that it did not know from now on."""
+        for name in self:
+            if self[name] is part:
+                return name
+        self._loaded[part.__name__] = part
+        return part.__name__
+
     def require_one(self, name: str) -> None:
         """Raise PluginError if several objects have been given that are called like that: which is meant?"""
         if f"{name}-2" in self._objects:

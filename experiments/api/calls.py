@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from idbench.experiments.api.keywords import with_keys
 from idbench.experiments.api.logs import given_log
 from idbench.experiments.api.results import Identification, SimulatedRun, path_of
 from idbench.experiments.errors import ExperimentError
@@ -19,6 +20,7 @@ from idbench.experiments.requests import jobs
 from idbench.experiments.requests.shared import ColumnOptions, LogRequest, MountingOptions, Parameters
 from idbench.experiments.requests.table import request_from
 from idbench.experiments.requests.words import request_keys
+from idbench.experiments.results.page import stages_of, watched
 from idbench.identify import BLOCKS, CHAINS, ESTIMATORS, MODELS, MotionLog
 from idbench.identify.plugins import Table, did_you_mean
 from idbench.sim.engine.simulation import simulate as simulated
@@ -32,6 +34,18 @@ PARTS: Mapping[str, Table[Any]] = {"model": MODELS, "chain": CHAINS, "estimator"
 """Keys whose values may be objects, or classes, in the place of names."""
 
 
+def _others(groups: Sequence[type], *, but: bool = False) -> set[str]:
+    """Return the keys of requests of logs that are not those of some groups; `but`: those that are."""
+    own = {key for group in groups for key in request_keys(group)}
+    return own if but else request_keys(LogRequest).keys() - own
+
+
+OF_ROBOT, OF_RUN = _others((Parameters, MountingOptions)), _others((Parameters,))
+NOT_READ = _others((Parameters, MountingOptions), but=True) | {"robot", "mask_speed", "cutoff", "estimator"}
+"""Keys of `LogRequest` that are none of loading a robot, of a run, of reading a log."""
+
+
+@with_keys(LogRequest, OF_ROBOT)
 def load_robot(robot: str | Path, **keys: Any) -> RobotModel:
     """Return a robot: its joints, and the parameters that can be identified.
 
@@ -53,12 +67,13 @@ def load_robot(robot: str | Path, **keys: Any) -> RobotModel:
     >>> idbench.load_robot("scara", add="offset").basis.names[-2:]
     ('off1', 'off2')
     """
-    asked = request_from(LogRequest, named(keys), "load_robot", taken=_others((Parameters, MountingOptions)))
-    made = RobotModel(absolute(str(robot)), asked.parameters, asked.mounting.mounting)
+    asked = request_from(LogRequest, named(keys), "load_robot", taken=OF_ROBOT)
+    made = RobotModel(absolute(str(path_of(robot, "load_robot"))), asked.parameters, asked.mounting.mounting)
     made.check()
     return made
 
 
+@with_keys(LogRequest, NOT_READ)
 def read_log(
     path: str | Path, torque: str | None = None, robot: RobotModel | str | Path | None = None, **keys: Any
 ) -> MotionLog:
@@ -80,10 +95,9 @@ def read_log(
     ExperimentError, LogError
         If the file cannot be read, or makes no log.
     """
-    robot = load_robot(robot) if isinstance(robot, str | Path) else robot
+    robot = robot if robot is None or isinstance(robot, RobotModel) else load_robot(robot)
     table = keys if torque is None else {**keys, "torque": torque}
-    taken = _others((Parameters, MountingOptions), but=True) | {"robot", "mask_speed", "cutoff", "estimator"}
-    asked = request_from(LogRequest, table, "read_log", taken=taken)
+    asked = request_from(LogRequest, table, "read_log", taken=NOT_READ)
     if sought := delay_method(asked.torque_delay):
         raise ExperimentError(f"torque_delay: the robot is needed for it: idbench.fit(..., torque_delay={sought!r})")
     file = file_of(path_of(path, "read_log"))
@@ -93,6 +107,7 @@ def read_log(
     return replace(found.logs[0], joints=found.columns.joints if robot is None else robot.robot.joints)
 
 
+@with_keys(jobs.IdentifyRequest, {"label"})
 def fit(
     log: Logs,
     robot: RobotModel | str | Path | None = None,
@@ -138,14 +153,15 @@ def fit(
     asked = request_from(jobs.IdentifyRequest, table | paths, "fit", taken={"label"})
     sought = delay_method(asked.torque_delay)
     if model is None and _files(logs) and _files(held_out) and truth is None:
-        return Identification(identified(asked), sought is None)
+        with watched(lambda: stages_of("identifying")):
+            return Identification(identified(asked), sought is None)
     if model is not None:
         model = _with_keys(model, asked, table)
     else:
         name = robot_of(asked).name if asked.log else absolute(asked.robot or SCARA)
         model = RobotModel(name, asked.parameters, asked.mounting.mounting)
     request = request_of(asked, model)
-    _require_truth(truth, model)
+    truth = _whole(truth, model)
     loaded = prepared(_read(logs, asked, model), request, sought=sought, band=chooses_band(asked))
     known = truth if truth is not None or not _files(logs) else truth_of(asked, request)
     if held_out and _files(held_out):
@@ -154,9 +170,11 @@ def fit(
         others = _read(held_out, asked, model)
         others = [late(each, loaded.read[0].channel) for each in others] if sought else others
         found = judged_on(loaded, {f"{k + 1}": each for k, each in enumerate(others)}, known, sought)
-    return Identification(fit_of(loaded.request, found), sought is None)
+    with watched(lambda: stages_of("identifying")):
+        return Identification(fit_of(loaded.request, found), sought is None)
 
 
+@with_keys(LogRequest, OF_RUN)
 def simulate(scenario: str | Path | Scenario, seed: int | None = None, **keys: Any) -> SimulatedRun:
     """Return a scenario, simulated: its log, its robot, and the true parameters.
 
@@ -176,7 +194,7 @@ def simulate(scenario: str | Path | Scenario, seed: int | None = None, **keys: A
     """
     made = scenario if isinstance(scenario, Scenario) else load_scenario(str(path_of(scenario, "simulate")))
     made = made if seed is None else replace(made, seed=seed)
-    asked = request_from(LogRequest, named(keys), "simulate", taken=_others((Parameters,)))
+    asked = request_from(LogRequest, named(keys), "simulate", taken=OF_RUN)
     return SimulatedRun(simulated(made), RobotModel(made.robot, asked.parameters))
 
 
@@ -192,7 +210,7 @@ def _names(key: str, value: Any) -> Any:
             PARTS[key].require_one(word)
     if key == "friction" and len(names) > 1 and not any("=" in name or name == AUTO for name in names):
         return ("+".join(names),)  # laws of all joints, one beside the other
-    return names if isinstance(value, list | tuple) else names[0]
+    return names if isinstance(value, list | tuple) or len(names) != 1 else names[0]
 
 
 def several(given: Any) -> tuple[Any, ...]:
@@ -209,12 +227,6 @@ def _files(logs: Sequence[Any]) -> bool:
     return all(files)
 
 
-def _others(groups: Sequence[type], *, but: bool = False) -> set[str]:
-    """Return the keys of requests of logs that are not those of some groups; `but`: those that are."""
-    own = {key for group in groups for key in request_keys(group)}
-    return own if but else request_keys(LogRequest).keys() - own
-
-
 def _require_logs(logs: Sequence[Any], held_out: Sequence[Any], keys: Mapping[str, Any]) -> None:
     """Raise ExperimentError if something is no log, or keys say how logs are read that were read already."""
     if not logs:
@@ -228,18 +240,20 @@ def _require_logs(logs: Sequence[Any], held_out: Sequence[Any], keys: Mapping[st
         raise ExperimentError(f"fit: {', '.join(given)} is how a log is read, and this one is: give it to read_log")
 
 
-def _require_truth(truth: Mapping[str, float] | None, model: RobotModel) -> None:
-    """Raise ExperimentError if a true parameter is unknown, or one has none."""
+def _whole(truth: Mapping[str, float] | None, model: RobotModel) -> Mapping[str, float] | None:
+    """Return true parameters, 0 for those of added laws; raise ExperimentError if one is unknown, or another is missing."""
     if truth is None:
-        return
+        return None
     if not isinstance(truth, Mapping):
         raise ExperimentError(f"truth = {truth!r:.60}: give a mapping of names to values, such as {{'Fs1': 0.5}}")
     names = model.basis.names
     if name := next((name for name in truth if name not in names), None):
         hint = did_you_mean(name, names)
         raise ExperimentError(f"truth: there is no parameter {name}{hint}; there are {', '.join(names)}")
-    if missing := [name for name in names if name not in truth]:
+    plain = replace(model, asked=Parameters()).basis.names
+    if missing := [name for name in names if name not in truth and name in plain]:
         raise ExperimentError(f"truth: {', '.join(missing)} is missing: give 0 for what the robot does not have")
+    return {name: truth.get(name, 0.0) for name in names}
 
 
 def _with_keys(model: RobotModel, asked: jobs.IdentifyRequest, table: Mapping[str, Any]) -> RobotModel:

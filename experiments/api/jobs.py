@@ -10,8 +10,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 from rich.console import Console
+from rich.text import Text
 
 from idbench.experiments.api.calls import PARTS, named, several
+from idbench.experiments.api.keywords import with_keys
+from idbench.experiments.api.results import path_of
 from idbench.experiments.errors import ExperimentError, StudyError
 from idbench.experiments.excite.excited import Excited
 from idbench.experiments.excite.job import excited
@@ -21,16 +24,19 @@ from idbench.experiments.paper.table1 import Table1
 from idbench.experiments.paper.table2 import Table2
 from idbench.experiments.requests import jobs
 from idbench.experiments.requests.table import request_from
+from idbench.experiments.results.page import runs_of, watched
 from idbench.experiments.servo.job import ServosFit, servos_identified
 from idbench.experiments.study.job import LARGEST_SHARD, run_missing, runs_of_shard, worker_pool
+from idbench.experiments.study.ratios import study_conclusion
 from idbench.experiments.study.statistics import Cell, cells
 from idbench.experiments.study.store import Store, arrays
 from idbench.experiments.study.study import Study
-from idbench.experiments.study.study_file import load_study
+from idbench.experiments.study.study_file import load_study, study_from
 from idbench.experiments.study.study_results import print_study, summary_of
 from idbench.experiments.text import PRINTED, printed
 from idbench.identify import BLOCKS
-from idbench.sim.scenario.scenario_file import load
+from idbench.sim.scenario.scenario import Scenario
+from idbench.sim.scenario.scenario_file import load, to_dict
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,12 +66,16 @@ class StudyTable:
         """Return the typical relative error of each combination, by its settings, chain, estimator and model."""
         return {(*cell.settings.values(), *cell.names): float(cell.typical) if cell.runs else np.nan for cell in self.cells}
 
+    def _show(self, console: Console) -> None:
+        console.print(Text(study_conclusion(self.study, self.cells, "").finding))
+        print_study(console, self.study, self.cells)
+
     def __repr__(self) -> str:
-        return printed(lambda console: print_study(console, self.study, self.cells))
+        return printed(self._show)
 
     def _repr_html_(self) -> str:
         console = Console(file=StringIO(), width=PRINTED, record=True)
-        print_study(console, self.study, self.cells)
+        self._show(console)
         return console.export_html(inline_styles=True, code_format="<pre>{code}</pre>")
 
 
@@ -74,8 +84,9 @@ Files = str | Path | Sequence[str | Path]
 
 
 def study(
-    name: str | Path | Study,
+    name: str | Path | Study | Scenario,
     *,
+    axes: Mapping[str, Sequence[Any]] | None = None,
     seeds: int | None = None,
     out: str | Path | None = None,
     threads: int | None = None,
@@ -85,8 +96,11 @@ def study(
 
     Parameters
     ----------
-    name : str, Path or Study
-        Name of a shipped study (`idbench study` lists them), its file (TOML), or the study itself.
+    name : str, Path, Study or Scenario
+        Name of a shipped study (`idbench study` lists them), its file (TOML), the study itself, or a scenario, whose parts may
+        be of classes of your own.
+    axes : mapping of str to sequence, optional
+        Values of the settings of a scenario that vary, such as {"encoder.lines": [1024, 4096]}.
     seeds : int, optional
         Independent runs per combination, instead of the study's number.
     out : str or Path, optional
@@ -114,13 +128,25 @@ def study(
     changed: dict[str, Any] = {key: tuple(map(tables[key].name_of, several(value))) for key, value in parts.items()}
     if seeds is not None:
         changed["seeds"] = seeds
-    described = replace(name if isinstance(name, Study) else load_study(str(name)), **changed)
-    asked = jobs.StudyRequest(threads=threads)
+    if not isinstance(axes, Mapping | None):
+        raise ExperimentError(f"study: axes = {axes!r:.60}: give a mapping of settings to values")
+    if isinstance(name, Scenario):
+        each = [{"field": field, "values": list(several(values))} for field, values in (axes or {"fs": [name.fs]}).items()]
+        question = f"How accurate is the identification of {name.name}?"
+        described = study_from({"name": name.name, "question": question, "scenario": to_dict(name), "axes": each}, "study")
+    elif axes is not None:
+        raise ExperimentError("study: axes are of a scenario; a study has its own")
+    else:
+        described = name if isinstance(name, Study) else load_study(str(path_of(name, "study")))
+    described = replace(described, **changed)
+    asked = request_from(jobs.StudyRequest, {"threads": threads}, "study")
     with TemporaryDirectory(prefix="idbench-") as folder:
-        store = _store(described, Path(folder) / described.name if out is None else Path(out))
+        store = _store(described, Path(folder) / described.name if out is None else path_of(out, "study: out"))
         with store.held(), worker_pool(asked, store) as pool:
             if pool is not None:
-                run_missing(store, pool, min(LARGEST_SHARD, runs_of_shard(asked, store)), _unheard)
+                todo, shard = sum(map(len, store.missing(LARGEST_SHARD))), min(LARGEST_SHARD, runs_of_shard(asked, store))
+                with watched(lambda: runs_of(described.name, todo), _unheard) as watch:
+                    run_missing(store, pool, shard, watch)
         return StudyTable.of(store)
 
 
@@ -134,21 +160,25 @@ def _store(described: Study, out: Path) -> Store:
     return store
 
 
+@with_keys(jobs.PayloadRequest)
 def fit_payload(log: Files, unloaded: Files = (), **keys: Any) -> LoadFit:
     """The payload, as `idbench payload` identifies it; files of logs, and its options by keyword."""
     return payload_of(_asked(jobs.PayloadRequest, "fit_payload", keys, log=log, unloaded=unloaded))
 
 
+@with_keys(jobs.GainsRequest)
 def fit_gains(log: Files, unloaded: Files = (), **keys: Any) -> LoadFit:
     """Return the torque constants of the drives, as `idbench gains` finds them; files of logs, and its options by keyword."""
     return gains_of(_asked(jobs.GainsRequest, "fit_gains", keys, log=log, unloaded=unloaded))
 
 
+@with_keys(jobs.ServoRequest)
 def fit_servos(log: Files, robot: str | Path, servo: str | Path, **keys: Any) -> ServosFit:
     """Return servos, identified from commands and positions as `idbench servo` does; files, and its options by keyword."""
     return servos_identified(_asked(jobs.ServoRequest, "fit_servos", {**keys, "robot": robot, "servo": servo}, log=log))
 
 
+@with_keys(jobs.ExciteRequest)
 def design(robot: str | Path, **keys: Any) -> Excited:
     """Return an exciting trajectory within the robot's limits, as `idbench excite` designs it; its options by keyword."""
     return excited(_asked(jobs.ExciteRequest, "design", {**keys, "robot": robot}), _unheard)[0]

@@ -9,7 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from idbench.experiments.api.keywords import in_python
 from idbench.experiments.api.logs import given_log
+from idbench.experiments.document import Conclusion
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.exports.exports import kind_of
 from idbench.experiments.identification.fit import Fit
@@ -18,7 +20,7 @@ from idbench.experiments.identification.load import within
 from idbench.experiments.identification.reading import late, read
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.judgement.held_out import Verdict
-from idbench.experiments.judgement.judgement import Conclusion, Judgement, conclusion, judge
+from idbench.experiments.judgement.judgement import Judgement, conclusion, judge
 from idbench.experiments.judgement.remedies import checks
 from idbench.experiments.requests.shared import LogRequest
 from idbench.experiments.results.attempts import Attempts
@@ -142,8 +144,8 @@ class Identification:
 
     @property
     def verdict(self) -> str:
-        """The verdict on held-out data in one sentence, and what to check first."""
-        return str(self.answer)
+        """The verdict on held-out data in one sentence, and what to do next, as keywords."""
+        return in_python(str(self.answer))
 
     def predict(
         self, q: Array, qd: Array, qdd: Array, model: str | None = None, *, interval: float | None = None
@@ -260,12 +262,12 @@ class Identification:
 
     def summary(self) -> dict[str, Any]:
         """The summary.json of `idbench identify`, but for the names of files."""
-        return summary_of(self.fit) | self.judgement.summary()
+        return summary_of(self.fit) | self.judgement.summary() | {"conclusion": self.answer.summary()}
 
     def _of(self, model: str | None) -> Any:
-        name = model or self.model
-        if name not in self.fit.estimates:
-            raise ExperimentError(f"there is no estimate of the {name} model; there are {', '.join(self.fit.estimates)}")
+        name = self.model if model is None else model
+        if not isinstance(name, str) or name not in self.fit.estimates:
+            raise ExperimentError(f"there is no estimate of the {name!s:.60} model; there are {', '.join(self.fit.estimates)}")
         return self.fit.estimates[name]
 
     def __repr__(self) -> str:

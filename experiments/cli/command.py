@@ -39,10 +39,12 @@ class Command:
 def command_of(options: Any, *, out: bool = False, absolute: bool = False) -> str:
     """Command line of a request: all that differs from the defaults, but for what only shows or writes its results.
 
-    `out` names the folder of the results, too; `absolute` names files from the root: the same command reads the same files.
+    `out` names folder and files of the results, too; `absolute` names files from the root: it reads the same ones.
     """
     folder = ["--out", quote(str(options.out))] if out and options.out else []
-    return " ".join([program(), options.called, *_words(options, request_type(options), absolute), *folder])
+    written = list(map(quote, map(str, getattr(options, "write", ())))) if out else []
+    words = [program(), options.called, *_words(options, request_type(options), absolute), *folder]
+    return " ".join([*words, *(["--write", *written] if written else [])])
 
 
 def _words(part: Any, kind: type, absolute: bool) -> Iterator[str]:

@@ -7,12 +7,15 @@ from typing import Any
 
 import numpy as np
 
+from idbench.experiments.document import Conclusion
 from idbench.experiments.errors import ExperimentError
+from idbench.experiments.identification.causes import remedy_of
 from idbench.experiments.identification.fit import Fit
 from idbench.experiments.identification.fitting import fit
 from idbench.experiments.identification.iterations import iterations
 from idbench.experiments.identification.logs import Logs
 from idbench.experiments.identification.request import Request
+from idbench.experiments.program import program
 from idbench.identify.blame import is_mistake
 from idbench.sim.engine.rejection import Rejection, rejection
 from idbench.sim.engine.run import Run
@@ -81,6 +84,19 @@ class ScenarioRun:
             if not is_mistake(error):
                 raise
             return None
+
+    def conclusion(self, folder: str) -> Conclusion:
+        """The largest error of the leading model, and how to go on with the results in a folder."""
+        fit = self.fit
+        found, truth = fit.estimates[fit.leading], fit.truth or {}
+        known = [(abs(100 * (x / true - 1)), abs(x - true) / sigma, name)
+                 for name, x, sigma in zip(found.names, found.X.tolist(), found.standard_errors.tolist(), strict=True)
+                 if (true := truth.get(name))]  # fmt: skip
+        off, z, name = max(known, default=(0.0, 0.0, ""))
+        finding = f"largest error {off:.2g} % ({name}, {z:.2g} sigma)" if name else "no parameter has a true value"
+        option = remedy_of(fit.diagnosis) if fit.diagnosis and fit.diagnosis[0].remedy else ""
+        step = f"{program()} identify {folder} {option}" if option else f"{program()} view {folder}"
+        return Conclusion("", f"Result: {fit.leading} model: {finding}", step)
 
     def summary(self) -> dict[str, Any]:
         """Return summary.json."""

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from idbench.experiments.document import Conclusion
 from idbench.experiments.errors import is_told, reason, trace
 from idbench.experiments.identification.causes import Cause, remedy_of
 from idbench.experiments.identification.consistent_robot import WrittenRobot
@@ -121,21 +122,6 @@ def _judged(title: str, make: Callable[[], HeldOut]) -> HeldOut | Unjudged:
 WEAK = 0.1  # Error of a torque constant from which on a log that would not show it is weak
 
 
-@dataclass(frozen=True)
-class Conclusion:
-    """The answer that terminal, report, recording and Python show."""
-
-    word: str
-    """The verdict on the leading model on the hardest held-out log; empty if there is no such log."""
-    finding: str
-    """The verdict in one sentence."""
-    step: str
-    """What to do next."""
-
-    def __str__(self) -> str:
-        return f"{self.finding}; next: {self.step}"
-
-
 def conclusion(judgement: Judgement, warnings: Mapping[str, Sequence[str]]) -> Conclusion:
     """The answer on the hardest held-out log.
 
@@ -151,25 +137,29 @@ def conclusion(judgement: Judgement, warnings: Mapping[str, Sequence[str]]) -> C
     step = of_log or _next(judgement, warnings)
     if word == "poor" and judgement.fit.robot_model.assumed:
         step = f"{ASSUMED}: --robot FILE names another"
-    return Conclusion(word, _finding(judgement, [] if of_log else causes), step)
+    finding, *why = _findings(judgement, [] if of_log else causes)
+    return Conclusion(word, finding, step, "; ".join(why))
 
 
-def _finding(judgement: Judgement, causes: Sequence[Cause]) -> str:
+def _findings(judgement: Judgement, causes: Sequence[Cause]) -> list[str]:
+    """The verdict in a sentence, and what limits it."""
     one, verdict = judgement.hardest, judgement.verdict
     if one is None or verdict is None:
-        return "Result: not validated"
+        return ["Result: not validated"]
     model = one.fit.leading
     result = f"Result: {verdict.word}{'' if model == THREE[0] else f' ({model} model)'}:"
     if verdict.wrong:
-        return f"{result} {verdict.wrong[0].finding}"
+        return [f"{result} {verdict.wrong[0].finding}"]
     worst = _worst(one)
     beyond = float(np.nanmax(np.nan_to_num(one.torques[model].percent_of_level(one.torques[model].excess), posinf=np.inf)))
     most = {"good": GOOD, "fair": FAIR}.get(verdict.word, np.inf)
     noisy = f", {error_percentage(beyond)} beyond noise and sigma," if beyond < most < worst else ""
     found = f"{result} torques within {error_percentage(worst)}{noisy} on {one.title.finding}"
-    seen = _power(judgement.fit) if verdict.word == "good" and not causes else []
+    seen = list(_power(judgement.fit)) if verdict.word == "good" and not causes else []
+    if len(seen) == 1:
+        found, seen = f"{found}; {seen[0]}", []
     far = [] if verdict.word == "poor" or causes else WrittenRobot(judgement.fit, model).strayed
-    return "; ".join([found, *(cause.words for cause in causes[:1]), *seen, *far])
+    return [found, *(cause.words for cause in causes[:1]), *seen, *far]
 
 
 def _power(fit: Fit) -> Iterator[str]:

@@ -12,7 +12,7 @@ import numpy as np
 from rich.console import Console
 from rich.text import Text
 
-from idbench.experiments.document import Document, Listing
+from idbench.experiments.document import Conclusion, Document, Listing
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.friction_choice import chosen_friction, words
 from idbench.experiments.identification.load import in_band, load
@@ -20,22 +20,18 @@ from idbench.experiments.identification.method import Method
 from idbench.experiments.identification.request import Request
 from idbench.experiments.identification.robot_model import RobotModel, absolute
 from idbench.experiments.loads import loads_text as text
-from idbench.experiments.loads.known_load import LoadJudgement, payload_parameters
-from idbench.experiments.loads.simulated import Pairs
+from idbench.experiments.loads.known_load import PAYLOAD, LoadJudgement, payload_parameters
 from idbench.experiments.requests.jobs import GainsRequest, LoadRequest, PayloadRequest
 from idbench.experiments.text import printed
 from idbench.identify import Array, IdentificationError
 from idbench.identify.loads.drive_gains import GainEstimate, identify_drive_gains
 from idbench.identify.loads.loaded_robot import LETTERS, LoadedRobot
 from idbench.identify.loads.payload import WAYS, PayloadEstimate, with_known_robot
-from idbench.sim.scenario.scenario_file import load as load_scenario
 
 GAIN_STEP = 1e-3
 """Relative change of a gain by which derivatives are taken: small beside what changes weights, large beside rounding."""
 
 OF_GAINS = "sigma of the payload has no part of an error of the torque constants (--gain-sigma), which looks like mass"
-
-RUNS = 20  # Simulated pairs of runs
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -48,6 +44,8 @@ class LoadFit:
     """The payload by the name of the way, or why that gives none; or the gains."""
     headline: str
     """The same in a line."""
+    step: str
+    """What to do with it, if it is good."""
     listing: Listing
     """The same as a table."""
     lines: tuple[str, ...]
@@ -68,13 +66,21 @@ class LoadFit:
         warnings = judgement.warnings(self.leading)
         word = judgement.word(warnings)
         each = [(v.word, f"{log}: {v.word}: {'; '.join(v.reasons)}") for log, v in judgement.verdicts.items()]
-        verdicts = [(word, f"Result: {word}, {self.headline}"), *each]
-        return Document(self.listing.title, robot, verdicts, {**self.doubts, **warnings}, [self.listing], self.lines)
+        every = {**warnings, **self.doubts}
+        doubts = [text for about in (PAYLOAD, *every) for text in every[about]] if word != "good" else []
+        answer = Conclusion(word, f"Result: {word}: {self.headline}", [*doubts, self.step][0])
+        return Document(
+            self.listing.title, Path(robot).name, answer, each, {**self.doubts, **warnings}, [self.listing], self.lines
+        )
 
     def summary(self) -> dict[str, Any]:
         """The summary.json of the command, but for the names of files."""
         logs = {name: verdict.summary() for name, verdict in self.judgement.verdicts.items()}
-        return {**self.content, "judgement": {"verdict": self.document.verdicts[0][0], "logs": logs}}
+        return {
+            **self.content,
+            "conclusion": (answer := self.document.conclusion).summary(),
+            "judgement": {"verdict": answer.word, "logs": logs},
+        }
 
     def show(self, console: Console) -> None:
         """Print what was found."""
@@ -119,7 +125,8 @@ def _payload(judgement: LoadJudgement, notes: Sequence[str], found: Mapping[str,
     lines = (*text.payload_lines(found, leading), *notes)
     content = {"robot": robot_model.name, **text.payload_summary(found, ways)}
     table = text.payload_table(ways, robot_model.robot.joints[-1])
-    return LoadFit(judgement, found, text.words_of_payload(leading), table, lines, content, leading)
+    step = "--write arm-with-load.xml adds the payload to the robot's file"
+    return LoadFit(judgement, found, text.words_of_payload(leading), step, table, lines, content, leading)
 
 
 def gains_of(asked: GainsRequest) -> LoadFit:
@@ -139,29 +146,20 @@ def gains_of(asked: GainsRequest) -> LoadFit:
     return LoadFit(
         judgement.with_gains(gains / given),
         found,
-        f"gains {' '.join(f'{gain:.4g}' for gain in gains)}",
+        text.words_of_gains(found, given, joints),
+        f"--gain {' '.join(f'{gain:.5g}' for gain in gains)} reads logs with these gains",
         text.gains_table(found, given.tolist(), joints),
-        (f"to read logs with them: --gain {' '.join(f'{gain:.5g}' for gain in gains)}", *notes),
+        notes,
         {"robot": robot_model.name, **text.gains_summary(found, given.tolist(), joints)},
         gains=gains,
         doubts={"the gains": text.doubts_of_gains(found, joints)},
     )
 
 
-def simulated_pairs(asked: LoadRequest) -> Pairs:
-    """Return simulated runs with the payload of a scenario and without it."""
-    if asked.log or asked.unloaded:
-        raise ExperimentError("--simulate needs no logs: leave them out")
-    scenario = load_scenario(str(asked.simulate))
-    if asked.robot is not None:
-        scenario = replace(scenario, robot=absolute(asked.robot))
-    return Pairs(scenario, RUNS if asked.runs is None else asked.runs, asked.parameters)
-
-
 def _loaded(asked: LoadRequest) -> tuple[LoadJudgement, tuple[str, ...]]:
     """Return the robot with its logs, to be judged, and what was done to them."""
     if not asked.log:
-        raise ExperimentError("name the logs with the payload, or --simulate SCENARIO")
+        raise ExperimentError("name the logs with the payload")
     if asked.robot is None:
         raise ExperimentError("--robot is missing: the file that describes the arm, or the name of one that ships")
     known = payload_parameters(asked.known.mass, asked.known.at, asked.known.inertia)

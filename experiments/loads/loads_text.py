@@ -8,7 +8,7 @@ import numpy as np
 from idbench.experiments.document import Listing
 from idbench.experiments.loads.known_load import negative_mass
 from idbench.experiments.results.writing import finite
-from idbench.identify import IdentificationError
+from idbench.identify import Array, IdentificationError
 from idbench.identify.basis.tree_links import KINDS
 from idbench.identify.loads.drive_gains import VAGUE, GainEstimate
 from idbench.identify.loads.loaded_robot import LETTERS
@@ -49,6 +49,8 @@ def words_of_payload(payload: PayloadEstimate) -> str:
     """Return the mass with its standard error, and where it is, in words."""
     known = dict(zip(payload.names, zip(payload.X.tolist(), payload.sigma.tolist(), strict=True), strict=True))
     mass, sigma = known.get("ML", (payload.known.get("ML", np.nan), 0.0))
+    if abs(mass) < 2 * sigma:
+        return f"no payload that exceeds its sigma: {concise(mass, sigma)} kg"
     body = body_of(payload)
     centre = f" at ({', '.join(f'{x:.3f}' for x in body['centre_of_mass'])}) m" if "mass" in body else ""
     return f"payload of {concise(mass, sigma)} kg{'' if negative_mass(payload) else centre}"
@@ -80,7 +82,15 @@ def payload_summary(found: Mapping[str, PayloadEstimate | str], ways: Mapping[st
         "parameters": list(leading.names),
         "known": dict(leading.known),
         "ways": {
-            way: {"estimate": p.X.tolist(), "sigma": p.sigma.tolist(), "covariance": p.covariance.tolist()}
+            way: {
+                "parameters": {
+                    name: {"value": x, "sigma": sigma, "unit": UNITS.get(name, "")}
+                    for name, x, sigma in zip(p.names, p.X.tolist(), p.sigma.tolist(), strict=True)
+                },
+                "estimate": p.X.tolist(),
+                "sigma": p.sigma.tolist(),
+                "covariance": p.covariance.tolist(),
+            }
             for way, p in ways.items()
         },
         "failures": {way: why for way, why in found.items() if isinstance(why, str)},
@@ -97,6 +107,16 @@ def gains_table(found: GainEstimate, given: Sequence[float], joints: Sequence[st
         rows.append((joint, f"{read:.5g}", value, f"{100 * sigma / abs(gain):.2g}", change))
     heads = ("", "read with", "gain", "%sigma", "change %")
     return Listing("gains of the drives: torque over what was logged", heads, tuple(rows))
+
+
+def words_of_gains(found: GainEstimate, given: Array, joints: Sequence[str]) -> str:
+    """Return the gain that changes most, in words."""
+    change = np.where(found.shown, np.abs(found.gains / given - 1), -1.0)
+    j = int(change.argmax())
+    if not found.shown[j]:
+        return "the payload shows no gain"
+    gain = concise(float(found.gains[j]), float(found.sigma[j]))
+    return f"gains change by up to {100 * change[j]:.2g} % ({joints[j]}: {gain}, read with {given[j]:.4g})"
 
 
 def doubts_of_gains(found: GainEstimate, joints: Sequence[str]) -> list[str]:

@@ -58,8 +58,8 @@ class Layer:
         self._signals = fit.problem.signals[0]
         self._called = fit.request.label if self._shade else ""
 
-    def send(self) -> tuple[str, Stream]:
-        """Send everything; return the stream, and the name of its file."""
+    def send(self, head: str = "") -> tuple[str, Stream]:
+        """Send everything, `head` above the estimates; return the stream, and the name of its file."""
         self._motion()
         for form, estimate in self._fit.estimates.items():
             at, color = f"{self._at}/{form}", model_color(form, self._shade)
@@ -77,8 +77,10 @@ class Layer:
         send_iterations(self.stream, self._at, self._fit)
         keys = {f"{self._fit.request.label}:": GREY, **{form: model_color(form, self._shade) for form in self._fit.estimates}}
         send_keys(self.stream, f"legend/{self._fit.request.label}", keys)
+        first = dict([*keys.items()][:2])  # the leading model
+        send_keys(self.stream, f"leading/{self._fit.request.label}", first)
         self.stream.page(f"{self._at}/report", estimates_table(self._fit))
-        self.stream.page(f"{self._at}/estimates", short_table(self._fit))
+        self.stream.page(f"{self._at}/estimates", "\n\n".join(filter(None, (head, short_table(self._fit)))))
         self.stream.page(f"{self._at}/noise", noise_table(self._fit, self._joints))
         self.stream.keep_sizes()
         self.stream.arrange(tabs(self._known | self.stream.paths))

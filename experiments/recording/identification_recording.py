@@ -55,8 +55,11 @@ class RunRecording:
         self.base.arm.trace(run.q[0])
         return [(BASE, self.base.stream), *([(INNER, self.base.inner)] if self.base.inner else [])]
 
-    def finish(self, ran: ScenarioRun) -> list[tuple[str, Stream]]:
-        """Add what only the end of a run gives, and the identification; return the streams by the name of their file."""
+    def finish(self, ran: ScenarioRun, head: str = "") -> list[tuple[str, Stream]]:
+        """Add what only the end of a run gives, and the identification; return the streams by the name of their file.
+
+        `head` says what it comes to, as in all functions here.
+        """
         streams = self.end(ran.run)
         if ran.rejection is not None:
             self.base.also("torque/rejection", ran.rejection.rejected)
@@ -64,10 +67,10 @@ class RunRecording:
         if is_long([ran.run.alone()]):  # of which no rows are kept
             return streams
         there = set().union(*(stream.paths for _, stream in streams))
-        return [*streams, Layer(self.base.stream.name, ran.fit, ran.run.robots[0].joints, there, self._audience).send()]
+        return [*streams, Layer(self.base.stream.name, ran.fit, ran.run.robots[0].joints, there, self._audience).send(head)]
 
 
-def record_log(fit: Fit, audience: Audience | None = None) -> list[tuple[str, Stream]]:
+def record_log(fit: Fit, head: str = "", audience: Audience | None = None) -> list[tuple[str, Stream]]:
     """Return the streams of an identified log's recording, by the name of their file."""
     log, robot = fit.logs.fitted[0], fit.robot_model.robot
     qd = measured_state(log, fit.processing).qd.T
@@ -77,10 +80,10 @@ def record_log(fit: Fit, audience: Audience | None = None) -> list[tuple[str, St
     base.replay(log, {}, qd)
     base.arm.trace(log.q)
     base.finish(about("log", "", ("measured",)))
-    return [(BASE, base.stream), Layer(base.stream.name, fit, robot.joints, base.stream.paths, audience).send()]
+    return [(BASE, base.stream), Layer(base.stream.name, fit, robot.joints, base.stream.paths, audience).send(head)]
 
 
-def add_layer(folder: Path, fit: Fit, audience: Audience | None = None) -> list[tuple[str, Stream]]:
+def add_layer(folder: Path, fit: Fit, head: str = "", audience: Audience | None = None) -> list[tuple[str, Stream]]:
     """Return the streams of the layers of the recording in a results folder, that of an identification first.
 
     The layers that are there already come anew with it, to lay out the new one beside them.
@@ -99,7 +102,7 @@ def add_layer(folder: Path, fit: Fit, audience: Audience | None = None) -> list[
         for path in reversed(others):
             whole.copy(path)
         whole.close()
-    made = Layer(name, fit, fit.robot_model.robot.joints, there, audience).send()
+    made = Layer(name, fit, fit.robot_model.robot.joints, there, audience).send(head)
     return [made, *rearranged(others, made[1])]
 
 

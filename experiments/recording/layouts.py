@@ -7,7 +7,7 @@ import rerun.blueprint as rrb
 
 from idbench.experiments.errors import ResultsError
 from idbench.experiments.recording.chart import NARROW
-from idbench.experiments.recording.run_layouts import RUN_LAYOUTS, residuals
+from idbench.experiments.recording.run_layouts import RUN_LAYOUTS, residuals, result
 from idbench.experiments.recording.views import (
     ACROSS,
     Part,
@@ -111,6 +111,7 @@ def tabs(paths: AbstractSet[str], active: str = "") -> rrb.Blueprint:
     if active and active not in made:
         raise ResultsError(f"this recording has no tab {active!r}; it has {', '.join(made)}")
     number = list(made).index(active) if active else 0
-    high = -(-len(shelf.of("legend/*")) // ACROSS)  # rows of legends
-    pages = [column(keys(shelf, "legend/*"), part, shares=[high, HIGHER], name=name) or part for name, part in made.items()]
+    of = {name: "leading/*" if name == result.__name__ else "legend/*" for name in made}  # legends of what is shown
+    high = -(-len(shelf.of("legend/*")) // ACROSS)  # rows of them
+    pages = [column(keys(shelf, of[name]), part, shares=[high, HIGHER], name=name) or part for name, part in made.items()]
     return rrb.Blueprint(rrb.Tabs(*pages, active_tab=number), time, collapse_panels=True)

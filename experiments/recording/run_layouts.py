@@ -30,12 +30,28 @@ LANES = (0.5, 0.3)  # Height of a view of lanes, and of each lane in it, in heig
 ESTIMATES = 12  # Plots of estimates that have room beside each other
 FEW = 3  # Kinds of row that have room one above the other
 
-JOINT_STATES = "green: moves, amber: reverses, red: rests, pink: saturated"
-MASK_STATES = "green: used, amber: partly, red: masked"
+JOINT_STATES = "green moves, amber turns, red rests, pink at a limit"
+MASK_STATES = "green used, amber partly, red masked"
+
+
+def result(shelf: Shelf) -> Part:
+    """First view: the arm and the verdict, torques measured and predicted, residuals; of many joints those that err most."""
+    rows = [row for row in _rows(shelf) if _unit(row) == "N m" and row != "power"]
+    if not rows:
+        return None
+    sizes = {row: shelf.largest(_first(shelf, "residual", row)) for row in rows}
+    worst = sorted(sorted(rows, key=sizes.__getitem__, reverse=True)[:FEW], key=rows.index)
+    fits, left = list[Part](), list[Part]()
+    for row in worst:
+        measured = shelf.of(f"identify/*/*/measured/{row}")[0]
+        fits.append(plot(shelf, f"{row}: torque [N m]", measured, *_first(shelf, "predicted", row)))
+        left.append(plot(shelf, f"{row}: residual [N m]", *_first(shelf, "residual", row)))
+    beside = column(arm(shelf), text(shelf, "identify/*/estimates"), shares=[1, 1])
+    return side_by_side("result", beside, column(*fits), column(*left), shares=[4, 5, 5])
 
 
 def overview(shelf: Shelf) -> Part:
-    """First view: the arm, the motion, torques measured and predicted, residuals, parameters."""
+    """The arm, the motion, torques measured and predicted, residuals, parameters."""
     rows, states = _rows(shelf), lanes(shelf, JOINT_STATES, "state/*")
     motion = column(
         plot(shelf, "q [rad]", "q/planned", "q/true") or plot(shelf, "q [rad]", "q/measured"),
@@ -209,8 +225,11 @@ def _many(shelf: Shelf) -> bool:
 
 def _of_models(shelf: Shelf, kind: str, row: str) -> list[str]:
     """Return the curves of a row: of all models, or, of many identifications, of the first model of each."""
-    if not _many(shelf):
-        return shelf.of(f"identify/*/*/{kind}/{row}")
+    return _first(shelf, kind, row) if _many(shelf) else shelf.of(f"identify/*/*/{kind}/{row}")
+
+
+def _first(shelf: Shelf, kind: str, row: str) -> list[str]:
+    """Return the curves of a row of the first model of each identification."""
     return [path for method in shelf.methods for path in shelf.of(f"identify/{method}/*/{kind}/{row}")[:1]]
 
 
@@ -246,5 +265,5 @@ def _known_units() -> dict[str, str]:
     return {x: unit for x, (_, unit) in KINDS.items()} | {_letters(p.name): p.unit for p in every}
 
 
-RUN_LAYOUTS = (overview, torques, friction, drive, filters, noise, excitation, parameters, iterations)
+RUN_LAYOUTS = (result, overview, torques, friction, drive, filters, noise, excitation, parameters, iterations)
 """Those of runs and logs, in the order of their tabs."""

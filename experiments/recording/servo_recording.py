@@ -19,11 +19,12 @@ COMMANDED = [200, 160, 60]  # Colour of commands
 
 
 def record_servos(
-    robot: Robot, name: str, log: ServoColumns, simulated: Mapping[str, Array], audience: Audience | None = None
+    robot: Robot, name: str, log: ServoColumns, simulated: Mapping[str, Array], head: str, audience: Audience | None = None
 ) -> list[tuple[str, Stream]]:
     """Return the stream of the recording of a log, by the name of its file.
 
-    `simulated` are the positions of the joints with an estimate, from commands alone [rad], by joint, shape (time,) each.
+    `head` is what the fit comes to; `simulated` are the positions of the joints with an estimate, from commands alone [rad], by
+    joint, shape (time,) each.
     """
     _, qd, _ = smoothed(log.t, log.q)
     fs = 1 / float(np.median(np.diff(log.t)))
@@ -38,6 +39,6 @@ def record_servos(
             base.stream.curve(f"{path}/q/{kind}", times, values, f"{kind} {joint}", color, width)
         base.stream.curve(f"{path}/residual", times, log.q[:, j] - q, f"measured - simulated {joint}", GREY, 1.5)
     base.finish(
-        f"## Servos, simulated from the commands of {name} alone\n\nYellow: commanded. Grey: measured. Third curve: simulated."
+        f"{head}\n\nSimulated from the commands of {name} alone. Yellow: commanded. Grey: measured. Third curve: simulated."
     )
     return [(BASE, base.stream)]

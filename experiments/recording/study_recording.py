@@ -18,7 +18,7 @@ from idbench.experiments.recording.scales import Words, decades, linear, named
 from idbench.experiments.recording.stream import Stream, part
 from idbench.experiments.study.answer import command, in_words, short, where, worst_runs
 from idbench.experiments.study.axis import Axis
-from idbench.experiments.study.ratios import study_answer
+from idbench.experiments.study.ratios import study_answer, study_conclusion
 from idbench.experiments.study.statistics import MIN_ERROR, Cell
 from idbench.experiments.study.study import Study
 from idbench.experiments.text import FORMS, GREY, JOINTS, Color, lighter
@@ -220,4 +220,6 @@ def _send_sigmas(stream: Stream, cells: Sequence[Cell]) -> None:
 
 def _text(study: Study, cells: Sequence[Cell], worst: Sequence[Worst]) -> str:
     lines = [f"- {name} {100 * e:+.2g} %: {where(cell, cells)}\n  `{again}`" for cell, name, e, _, again in worst[:LISTED]]
-    return "\n\n".join([f"# {study.question}", study_answer(study, cells), TYPICAL, "## Worst runs", "\n".join(lines)])
+    first = study_conclusion(study, cells, "").finding
+    parts = [f"# {study.question}", f"**{first}**", study_answer(study, cells), TYPICAL, "## Worst runs", "\n".join(lines)]
+    return "\n\n".join(parts)

@@ -40,6 +40,10 @@ class Shelf:
             found += [path for path, parts in same if all(parts[at] == part for at, part in fixed)]
         return found
 
+    def largest(self, paths: Iterable[str]) -> float:
+        """Largest size of curves; 0 if none is known."""
+        return max((float(size) for path in paths for size in self.sizes.get(path, ())), default=0.0)
+
     def rms(self, paths: Iterable[str]) -> str:
         """Size of curves for a title: the viewer's axes may have no number but 0."""
         if not (known := [size for path in paths for size in self.sizes.get(path, ())]):

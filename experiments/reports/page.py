@@ -10,9 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from idbench.experiments.document import Conclusion
 from idbench.experiments.identification.fit import Fit
 from idbench.experiments.judgement.held_out import HeldOut
-from idbench.experiments.judgement.judgement import Conclusion, Judgement, Unjudged
+from idbench.experiments.judgement.judgement import Judgement, Unjudged
 from idbench.experiments.judgement.warnings import WEAK, doubtful
 from idbench.experiments.reports.estimates import EstimatesTable, all_units, correlated, error_shares
 from idbench.experiments.reports.figures import (

@@ -60,10 +60,6 @@ class LoadRequest(LogRequest):
     unloaded: words.Files = ()
     """Logs without the payload."""
     known: KnownOptions = KnownOptions()  # frozen
-    simulate: words.Scenario = None
-    """Simulate a scenario with and without its payload instead of reading logs, and compare the result with the true values."""
-    runs: words.Count = None
-    """Number of simulations. Default: 20."""
 
 
 @dataclass(frozen=True)

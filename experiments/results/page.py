@@ -1,12 +1,13 @@
 """What a command prints: shown as soon as it is complete, whatever becomes of the rest."""
 
+import builtins
 import json
 import re
 import sys
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from io import StringIO
 from typing import Any, Protocol, TextIO
 
@@ -45,6 +46,11 @@ def progress_of(what: str) -> Iterator[Callable[[float], None]]:
     """Give what receives the share of a work that is done, and shows it."""
     with stages_of(what) as told:
         yield lambda share: told(f"{share:4.0%}", share)
+
+
+def watched(context: Callable[[], AbstractContextManager[Any]], otherwise: Any = None) -> AbstractContextManager[Any]:
+    """Context that shows the progress of a call of Python where somebody types, in a notebook or at a prompt."""
+    return context() if hasattr(builtins, "__IPYTHON__") or hasattr(sys, "ps1") else nullcontext(otherwise)
 
 
 @contextmanager
@@ -102,7 +108,6 @@ def _lines(console: Console, what: str) -> Iterator[Told]:
 
 WIDTH = 144  # Characters of a line where no terminal says how many it has
 
-COLORS = {"good": "green", "fair": "yellow", "poor": "red"}  # Of the verdicts
 NOT_SAVED = "not saved: --out FOLDER keeps it, with a report and a recording"  # What is said where nobody named a folder
 
 

@@ -47,9 +47,13 @@ def locked(folder: Path, busy: ExperimentError) -> Iterator[None]:
         os.close(held)
 
 
+SCHEMA = 1  # Of summaries; rises when a key changes its meaning or goes
+
+
 def write_summary(path: Path, summary: dict[str, Any]) -> None:
-    """Write `summary` as JSON, with the version of idbench."""
-    path.write_text(json.dumps({"version": version("idbench"), **summary}, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    """Write `summary` as JSON that follows summary.schema.json, with the versions of the schema and of idbench."""
+    versions = {"schema": SCHEMA, "version": version("idbench")}
+    path.write_text(json.dumps(versions | summary, indent=2, allow_nan=False) + "\n", encoding="utf-8")
 
 
 def summarize(estimate: Estimate, truth: list[float] | None) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from idbench.experiments.document import Document
+from idbench.experiments.document import Conclusion, Document
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.causes import suspect_summary
 from idbench.experiments.identification.reading import said_of
@@ -66,12 +66,13 @@ class ServosFit:
         return verdict_lines(self.fits, self.errors["fitted"], self.errors.get("held out", {}), moved, self.mistakes)
 
     @property
-    def step(self) -> str:
-        """What to do next: mend what was proved, or look at the first doubt; a good result is kept."""
+    def conclusion(self) -> Conclusion:
+        """The verdict, and what to do next: mend what was proved, or look at the first doubt; a good result is kept."""
         remedies = [remedy_of(mistake) for mistake in self.mistakes.values()]
         doubts = [line for lines in self.warnings.values() for line in lines]
-        kept = ["--write robot.xml servo.py keeps the servos"] if self.verdicts[0][0] == "good" else doubts
-        return [*remedies, *kept, "log another motion, and name it with --validate"][0]
+        word, finding = self.verdicts[0]
+        kept = ["--write robot.xml servo.py keeps the servos"] if word == "good" else doubts
+        return Conclusion(word, finding, [*remedies, *kept, "log another motion, and name it with --validate"][0])
 
     @property
     def lines(self) -> list[str]:
@@ -90,9 +91,10 @@ class ServosFit:
     def document(self) -> Document:
         """What the fits say: verdicts, parameters, positions of the last log and their errors."""
         loops = ", ".join(dict.fromkeys(f"driven by {fit.servo.kind}" for fit in self.fits.values()))
-        title, of_laws = f"{self.servos.robot}: {', '.join(self.fits)}", (choice_table(*of) for of in self.choices.items())
+        title = f"{Path(self.servos.robot).stem}: {', '.join(self.fits)}"
+        of_laws, (_, *others) = (choice_table(*of) for of in self.choices.items()), self.verdicts
         tables = [servo_table(self.fits, self.errors), *of_laws]
-        return Document(title, loops, self.verdicts, self.warnings, tables, self.lines, self.step, self._figures)
+        return Document(title, loops, self.conclusion, others, self.warnings, tables, self.lines, self._figures)
 
     def _figures(self) -> list[tuple[str, str]]:
         """Titles and pictures of the positions of the last log, and of their errors."""
@@ -130,7 +132,11 @@ class ServosFit:
     def summary(self) -> dict[str, Any]:
         """Summary of the fits and of their errors."""
         each = {what: {joint: [float(x) for x in e] for joint, e in of.items()} for what, of in self.errors.items()}
-        return self.parameters() | {"position_error": each, "verdict": [line for _, line in self.verdicts], "next": self.step}
+        return self.parameters() | {
+            "position_error": each,
+            "verdict": [x for _, x in self.verdicts],
+            "conclusion": self.conclusion.summary(),
+        }
 
 
 Heard = Callable[[str, Identified | str, ServosFit], None]

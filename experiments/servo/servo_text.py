@@ -77,7 +77,8 @@ def warnings_of(fits: Mapping[str, ServoFit | str], mistakes: Collection[str] = 
 
 def _warnings(fit: ServoFit, mistaken: bool) -> Iterator[str]:
     if spikes := sum(int((~run.read_well).sum()) for run in fit.loop.runs):
-        yield f"{spikes} positions are spikes, from which the joint came back at once: they are left out"
+        what = f"{spikes} position samples are spikes" if spikes > 1 else "1 position sample is a spike"
+        yield f"{what}, from which the joint came back at once: left out"
     if not fit.explained:
         yield (
             f"commands explain the motion to {fit.scale:.2g} rad only, of {fit.excitation.range:.2g} rad: are kp, gain and "
@@ -132,8 +133,8 @@ def verdict_lines(
     """
     lines, word_of, worst = list[tuple[str, str]](), dict[str, str](), list[tuple[bool, int, float, str]]()
     for joint, fit in fits.items():
-        word, why = _holds(fit, fitted[joint], held_out.get(joint), moved.get(joint, 0.0), joint in mistakes)
-        lines.append((joint, f"{word}: {why}" if joint in held_out else why))
+        word, why, more = _holds(fit, fitted[joint], held_out.get(joint), moved.get(joint, 0.0), joint in mistakes)
+        lines.append((joint, f"{word}: {why}{more}" if joint in held_out else why))
         word_of[lines[-1][1]] = word
         share = float(np.mean(held_out.get(joint, 0.0))) / max(moved.get(joint, 0.0), TINY)
         moves = moved.get(joint, np.inf) > STILL * fit.excitation.range
@@ -168,10 +169,10 @@ def remedy_of(mistake: Suspect) -> str:
     return f"--find {LETTERS[mistake.cause]}"
 
 
-def _holds(fit: ServoFit, fitted: Array, held_out: Array | None, moved: float, mistaken: bool) -> tuple[str, str]:
-    """Verdict on a joint, and why."""
+def _holds(fit: ServoFit, fitted: Array, held_out: Array | None, moved: float, mistaken: bool) -> tuple[str, str, str]:
+    """Verdict on a joint, why, and details."""
     if held_out is None:
-        return "unsure", "no held-out log says whether the model holds elsewhere (name a second log)"
+        return "unsure", "no held-out log: name a second one", ""
     floor, ratio = fit.loop.step / 4, float(np.mean(held_out) / max(float(np.mean(fitted)), TINY))
     share = 100 * float(np.mean(held_out)) / max(moved, TINY)
     off = f"positions off by {error_percentage(share)} of the motion on other logs"
@@ -179,8 +180,8 @@ def _holds(fit: ServoFit, fitted: Array, held_out: Array | None, moved: float, m
     exact = bool(np.mean(held_out) <= 2 * floor)
     word = best if exact or share <= GOOD else "fair" if share <= FAIR else "poor"
     if ratio > ALIKE and share > GOOD and not exact:
-        return word, f"{off}, {ratio:.2g} times as much as on the fitted ones"
-    return word, off
+        return word, off, f", {ratio:.2g} times as much as on the fitted ones"
+    return word, off, ""
 
 
 def _lacks(fit: ServoFit) -> str:

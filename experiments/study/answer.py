@@ -26,12 +26,13 @@ def requirements(cells: Sequence[Cell], edges: int = 4) -> str:
     varied = [field for field in fields if len({str(cell.settings[field]) for cell in cells}) > 1]
     if len(varied) != 1 or not all(isinstance(cell.settings[varied[0]], float) for cell in cells):
         return ""
-    found = list(_requirements(cells, varied[0], edges))
-    return f"a typical error of {', '.join(found[-MAX_NAMED:])}" if found else ""
+    found = list(_requirements(cells, varied[0], edges))[-MAX_NAMED:]
+    each = [f"{level} {bound} {value}" if k == 0 else f"{level} {value}" for k, (level, bound, value) in enumerate(found)]
+    return f"a typical error of {', '.join(each)}" if found else ""
 
 
-def _requirements(cells: Sequence[Cell], field: str, edges: int) -> Iterator[str]:
-    """Yield what each level asks, the largest error first."""
+def _requirements(cells: Sequence[Cell], field: str, edges: int) -> Iterator[tuple[str, str, str]]:
+    """Yield each level, the bound that it requires, and its value, the largest error first."""
     falling = sorted(cells, key=lambda cell: cell.settings[field])
     rises = falling[-1].typical > falling[0].typical
     weakest_first = falling[::-1] if rises else falling
@@ -39,7 +40,8 @@ def _requirements(cells: Sequence[Cell], field: str, edges: int) -> Iterator[str
         enough = [k for k in range(len(weakest_first)) if all(cell.typical <= level for cell in weakest_first[k:])]
         if enough and enough[0] > 0:
             value = weakest_first[enough[0]].settings[field]
-            yield f"{100 * level:g} % requires {field} of at {'most' if rises else 'least'} {in_words(value, field, edges)}"
+            bound = f"requires {field} of at {'most' if rises else 'least'}"
+            yield f"{100 * level:g} %", bound, in_words(value, field, edges)
 
 
 def in_words(value: object, field: str = "", edges: int = 4) -> str:
@@ -60,8 +62,17 @@ def answer(cells: Sequence[Cell], edges: int = 4) -> str:
 
 
 def headline(cells: Sequence[Cell], edges: int = 4) -> str:
-    """Return the sentence of the answer that says most: what an error of a size takes, or else what errs least."""
-    return _asked(cells, edges) or _who(cells)
+    """Return the answer in a few words: what an error of a size takes, or else which method errs least, and by how much."""
+    if not (solved := [cell for cell in cells if cell.runs]):
+        return "no run gave an estimate"
+    groups = list(grouped(solved).values())
+    best = [_best(group) for group in groups]
+    if asked := requirements(best, edges):
+        return asked
+    low, high = (percent(pick(cell.typical for cell in best)) for pick in (min, max))
+    errors = f"typical error {low}" if len(best) == 1 else f"typical errors {low} to {high}"
+    counts = Counter(method(cell, solved) for cell in best)
+    return errors if len(solved) == len(groups) else f"least with {counts.most_common(1)[0][0]}: {errors}"
 
 
 def _asked(cells: Sequence[Cell], edges: int) -> str:
@@ -109,15 +120,16 @@ def _winners(groups: Sequence[Sequence[Cell]], best: Sequence[Cell], cells: Sequ
     unbeaten = max(counts.values())
     lonely = sum(len(group) == 1 for group in groups)
     words = [f"Least typical error: {' and '.join(winners)}"]
-    if len(groups) > 1 or unbeaten < len(groups):
-        alone = f" (in {lonely} nothing else gave an estimate)" if lonely else ""
-        words.append(f"unbeaten in {unbeaten} of {len(groups)} settings{alone}")
-    if len({method(c, cells) for c in cells}) > len(winners):
-        sure = sum(set(names) <= set(winners) for names in rivals)
-        words.append(f"below all others {f'in {sure} ' if len(groups) > 1 else ''}(p < {SURE:g})" if sure else "")
+    sure = sum(set(names) <= set(winners) for names in rivals) if len({method(c, cells) for c in cells}) > len(winners) else 0
+    if sure == len(groups):
+        words.append(f"best{f' in all {sure} settings' if sure > 1 else ''} (p < {SURE:g})")
+    elif len(groups) > 1 or unbeaten < len(groups):
+        words.append(f"best or not significantly worse in {unbeaten} of {len(groups)} settings")
+        words += [f"best in {sure} (p < {SURE:g})"] if sure else []
+    words += [f"the only one with an estimate in {lonely}"] if lonely else []
     tied = sum(len(set(names) & set(winners)) > 1 for names in rivals)
-    between = f"not significantly different{f' in {tied}' if len(groups) > 1 else ''}" if len(winners) > 1 else ""
-    return ", ".join(filter(None, words)) + (f"; {between}" if between else "")
+    between = f"; no significant difference between them{f' in {tied}' if len(groups) > 1 else ''}" if len(winners) > 1 else ""
+    return ", ".join(words) + between
 
 
 def _best(group: Sequence[Cell]) -> Cell:

@@ -6,7 +6,8 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from idbench.experiments.study.answer import answer, combination, failures, smallest_named
+from idbench.experiments.document import Conclusion
+from idbench.experiments.study.answer import answer, combination, failures, headline, percent, smallest_named
 from idbench.experiments.study.statistics import CONFIDENCE, Cell, ln_typical
 from idbench.experiments.study.study import SEVERITY, Study
 from idbench.experiments.text import new_table
@@ -142,6 +143,20 @@ def study_answer(study: Study, found: Sequence[Cell]) -> str:
         return answer(found, study.edges)
     parts = conclusion([row for _, row in ratios(found)]), failures(found)
     return " ".join(filter(None, parts)) or answer(found, study.edges)
+
+
+def study_conclusion(study: Study, found: Sequence[Cell], step: str) -> Conclusion:
+    """Return the answer of a study in a few words, and what to do next."""
+    solved = [cell for cell in found if cell.runs]
+    if study.causes and solved:
+        wrong = np.mean([cell.named_share[1] for cell in solved])
+        words = f"another cause than the fault is named in {percent(float(wrong))} of the runs"
+    elif compares_models(study) and (rows := [row for _, row in ratios(found)]):
+        spans = [f"{model} {_span(of)}" for model in ("implicit", "power") if (of := _of(rows, [model, "explicit"]))]
+        words = f"errors over the explicit model's: {', '.join(spans)}"
+    else:
+        words = headline(found, study.edges)
+    return Conclusion("", f"Result: {words}", step)
 
 
 def compares_models(study: Study) -> bool:

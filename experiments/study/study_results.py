@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from rich.console import Console
 from rich.text import Text
 
 from idbench.experiments.errors import ResultsError
+from idbench.experiments.program import program
 from idbench.experiments.reports.figures import rendered
 from idbench.experiments.results.attempts import Attempts
 from idbench.experiments.results.folder import ResultsFolder
@@ -18,7 +20,6 @@ from idbench.experiments.results.writing import finite, write_summary
 from idbench.experiments.study.answer import (
     command,
     grouped,
-    headline,
     in_words,
     method,
     percent,
@@ -37,7 +38,15 @@ from idbench.experiments.study.figures import (
     named_figure,
     typical_figure,
 )
-from idbench.experiments.study.ratios import compares_models, interval, pair_of, ratios, ratios_table, study_answer
+from idbench.experiments.study.ratios import (
+    compares_models,
+    interval,
+    pair_of,
+    ratios,
+    ratios_table,
+    study_answer,
+    study_conclusion,
+)
 from idbench.experiments.study.statistics import BOUNDS, NAMED, Cell, cells, differences
 from idbench.experiments.study.store import Store, arrays
 from idbench.experiments.study.study import Study
@@ -58,7 +67,7 @@ def report(study: Study, cells: Sequence[Cell], seconds: dict[str, float], folde
         "report.html.j2",
         study=study,
         methods=len(study.methods),
-        headline="" if compares_models(study) or not solved or study.causes else headline(solved, study.edges),
+        conclusion=study_conclusion(study, cells, _next(folder)),
         answer=study_answer(study, cells),
         typical=named_figure(alike, axis) if study.causes else typical_figure(alike, axis, study.edges) if solved else "",
         causes=study.causes,
@@ -137,8 +146,10 @@ def write_results(page: "Page", store: Store, folder: ResultsFolder, recording: 
     """Print the answer of a study, write summary.json into its folder, then report and recording, which may fail alone."""
     study, seconds = store.study, store.seconds()
     found = cells(arrays(store.table()), study.varied, study.parameters)
+    answer = study_conclusion(study, found, _next(folder.out))
+    answer.show(page)
     print_study(page, study, found)
-    summary = summary_of(study, found, seconds)
+    summary = summary_of(study, found, seconds) | {"conclusion": answer.summary()}
     page.found |= summary | {"folder": str(folder.out)}
     page.show()
     with folder.complete() as hidden:
@@ -151,6 +162,10 @@ def write_results(page: "Page", store: Store, folder: ResultsFolder, recording: 
         page.print(Text(f"\nwritten to {store.folder}: open {store.folder / 'report.html'}"), soft_wrap=True)
     if not any(cell.runs for cell in found):
         raise ResultsError(f"no run of study {study.name} gave an estimate: {_reasons(found)[0]}")
+
+
+def _next(folder: Path) -> str:
+    return f"{program()} view {quote(str(folder))}"
 
 
 def print_study(page: Console, study: Study, found: Sequence[Cell]) -> None:

@@ -53,7 +53,7 @@ class TorqueChannel:
     """What the torque of each joint is late beyond the delay [s]; by default nothing."""
 
     def __post_init__(self) -> None:
-        if self.meaning not in get_args(Meaning):
+        if not isinstance(self.meaning, str) or self.meaning not in get_args(Meaning):
             raise SettingError(f"torque meaning {self.meaning!r} is unknown; known: {', '.join(get_args(Meaning))}")
         require_finite(delay=self.delay, **{f"lags[{j}]": lag for j, lag in enumerate(self.lags)})
         for sigma in np.atleast_1d(self.delay_sigma):

@@ -141,10 +141,9 @@ def _value(key: str, value: Any) -> Any:
 
 
 def _kind(key: str, value: Any) -> str:
-    for name in KINDS[key]:
-        if KINDS[key][name] is type(value):
-            return name
-    raise ScenarioError(f"{key}: {type(value).__name__} is not in the table of {KINDS[key].point}")
+    if not isinstance(value, KINDS[key].kind):
+        raise ScenarioError(f"{key}: {type(value).__name__} is none of the {KINDS[key].point}")
+    return KINDS[key].own(type(value))
 
 
 def to_toml(scenario: Scenario) -> str:

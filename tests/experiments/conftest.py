@@ -7,7 +7,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
+from jsonschema import Draft202012Validator
 
+import idbench as package
 from idbench.experiments.cli import main
 from idbench.identify import MotionLog
 from idbench.identify.files.log_file import read_log, write_log
@@ -49,6 +51,10 @@ def idbench(capsys, monkeypatch, tmp_path):
     return run
 
 
+SCHEMA = json.loads((Path(package.experiments.__file__).parent / "results" / "summary.schema.json").read_text())
+SUMMARIES = Draft202012Validator(SCHEMA)
+
+
 class Ran(NamedTuple):
     """What a command printed, and the summary in its --out."""
 
@@ -66,7 +72,10 @@ def ran(idbench):
         code, out, err = idbench(*words)
         assert code == 0, err
         path = Path(words[words.index("--out") + 1], "summary.json") if "--out" in words else Path("none")
-        return Ran(out, err, json.loads(path.read_text()) if path.exists() else None)
+        summary = json.loads(path.read_text()) if path.exists() else None
+        if summary is not None:
+            SUMMARIES.validate(summary)
+        return Ran(out, err, summary)
 
     return run
 

@@ -53,7 +53,9 @@ def test_a_fit_of_files_is_that_of_the_command(files, ran):
     out, _, summary = ran("identify", files / "first.parquet", words, files / "second.parquet")
     fit = idbench.fit(files / "first.parquet", validate=files / "second.parquet", model="explicit", estimator="WLS")
     assert as_json(fit.summary()) == as_json(summary)
-    assert fit.verdict.split("; next: ") == [line.removeprefix("next: ") for line in out.splitlines()[:2]]
+    finding, why, step, *_ = out.splitlines()
+    assert fit.verdict == f'{finding}; {why}; next: friction=["standard", "2=standard+cogging:28"]'
+    assert step == "next: --friction standard 2=standard+cogging:28"
 
 
 def test_a_fit_of_logs_is_that_of_their_files(files):
@@ -81,6 +83,8 @@ def test_a_study_is_that_of_the_command(tmp_path, ran):
     )
     (tmp_path / "short.toml").write_text(text)
     written, table = ran("study short.toml --no-rerun --out kept").summary, idbench.study("short.toml")
+    assert written["conclusion"]["finding"].startswith("Result: ")
+    assert repr(table).startswith(written.pop("conclusion")["finding"])
     assert as_json(table.summary() | {"seconds": 0}) == as_json(written | {"seconds": 0})
     assert "1024" in repr(table)
     own = idbench.study("short.toml", estimators=["WLS", Ridge(), Ridge(1e-3)])

@@ -5,10 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from pairs import Pairs
 
 from idbench.experiments.errors import ExperimentError, ResultsError
 from idbench.experiments.loads.job import payload_of
-from idbench.experiments.loads.simulated import Pairs
 from idbench.experiments.requests.jobs import KnownOptions, PayloadRequest
 from idbench.experiments.requests.shared import ColumnOptions
 from idbench.identify import ESTIMATORS, LogError, MotionLog, SettingError
@@ -35,7 +35,7 @@ def pairs():
         "physics": {"step": 0.0025},
         "payload": LOAD,
     }
-    return Pairs(from_dict(content), 1)
+    return Pairs(from_dict(content))
 
 
 def short(pairs):
@@ -112,7 +112,7 @@ def test_gains_are_found(pairs, all_known):
 def test_least_squares_of_currents_finds_gains_too_small(pairs):
     """Noise of the currents on the side of the parameters: the classical fault, which the way taken here does not have."""
     noisy = replace(short(pairs), torque=replace(pairs.scenario.torque, noise=(2.0,)))
-    pair = Pairs(noisy, 1)
+    pair = Pairs(noisy)
     robot = replace(pair.robot(0, {"ML": 2.0}), estimator=ESTIMATORS.create("WLS"))
     ours = identify_drive_gains(robot)
     rows = robot.estimated(robot.of_both, robot.both.basis).problem.rows
@@ -130,7 +130,7 @@ def test_least_squares_of_currents_finds_gains_too_small(pairs):
 def test_a_payload_on_the_axis_says_nothing_of_its_gain(pairs):
     """The last joint of a payload whose mass alone counts, on its axis, is refused; the others are not."""
     on_axis = replace(short(pairs), payload=replace(pairs.scenario.payload, position=(0.0, 0.0, 0.15), inertia=0.0))
-    pair = Pairs(on_axis, 1)
+    pair = Pairs(on_axis)
     gains = np.array([0.8, 1.3, 1.1, 0.75, 1.25, 0.9])
     robot = replace(pair.robot(0, {"ML": 2.0}, gains), estimator=ESTIMATORS.create("WLS"))
     found = identify_drive_gains(robot)
@@ -247,14 +247,6 @@ def test_the_command_that_shows_the_gains_is_said_in_full(files):
     assert command.endswith("--robot puma560 --mass KG --at X Y Z")
     known = payload_of(asked_of(files, known=KnownOptions(mass=3.0)))
     assert any("--mass 3 --at X Y Z" in warning for warning in known.judgement.warnings(known.leading)["the payload"])
-
-
-@pytest.mark.thorough
-def test_all_ways_are_compared_on_a_simulated_robot(ran):
-    out, _, summary = ran("payload --simulate payload --runs 1 --out ways")
-    assert "within 2 sigma" in out
-    assert set(summary["ways"]) == set(WAYS)
-    assert len(summary["ways"]["together"]["rms"]) == len(summary["ways"]["together"]["parameters"]) > 0
 
 
 def test_the_delay_is_that_of_the_logs_without_the_payload(files):

@@ -23,9 +23,9 @@ def log():
 @pytest.mark.parametrize("signs", [(1, 1), (-1, 1), (1, -1), (-1, -1)])
 def test_a_torque_with_the_other_sign_is_no_fair_result(log, signs, tmp_path, ran):
     write_log(replace(log, tau=log.tau * signs), tmp_path / "log.csv")
-    first, then = ran("identify log.csv --robot two_link --torque instantaneous").out.splitlines()[:2]
+    first, *then = ran("identify log.csv --robot two_link --torque instantaneous").out.splitlines()[:3]
     assert first.startswith("Result: good: torques within" if min(signs) > 0 else "Result: poor")
-    assert (then == f"next: --gain {signs[0]} {signs[1]}") == (min(signs) < 0)
+    assert (f"next: --gain {signs[0]} {signs[1]}" in then) == (min(signs) < 0)
 
 
 @pytest.mark.parametrize("delay", ["estimate", "joints", "0"])

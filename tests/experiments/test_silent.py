@@ -46,7 +46,7 @@ def test_a_study_compares_laws_of_friction(tmp_path, monkeypatch, capsys):
     assert "standard+stribeck:0.1" in printed
     assert "nan" not in printed
     assert "explicit (standard)" in summary["answer"]
-    assert "unbeaten in 2 of 2 settings" in summary["answer"]
+    assert "best or not significantly worse in 2 of 2 settings" in summary["answer"]
     assert "standard+stribeck:0.1" in (tmp_path / "out" / "report.html").read_text()
     assert main(["run", "--from", "out", "--index", "0", "--method", "1", "--no-rerun", "--out", "again"]) == 0
     assert "Fst1" in capsys.readouterr().out

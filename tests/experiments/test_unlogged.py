@@ -261,4 +261,4 @@ def test_joints_that_never_moved_are_named_in_the_verdict_and_in_files(tmp_path)
     fit = identified(IdentifyRequest(log=(tmp_path / "half.parquet",), robot="puma560", model="explicit"))
     assert fit.still == ["joint4", "joint5", "joint6"]
     assert "NOTHING IS KNOWN of joint4, joint5, joint6, which never moved" in origin(fit, "explicit")
-    assert "nothing is known of joint4, joint5, joint6: no motion" in conclusion(judge(fit), {}).finding
+    assert "nothing is known of joint4, joint5, joint6: no motion" in conclusion(judge(fit), {}).why

@@ -23,7 +23,7 @@ from idbench.experiments.reports.estimates import models_in_full
 from idbench.experiments.reports.printed import print_fit, print_held_out
 from idbench.experiments.results.attempts import Attempts
 from idbench.experiments.results.folder import ResultsFolder
-from idbench.experiments.results.page import COLORS, Page, stages_of
+from idbench.experiments.results.page import Page, stages_of
 from idbench.experiments.results.writing import write_summary
 from idbench.identify.files.log_file import write_log
 
@@ -54,12 +54,11 @@ def identify(options: Identify) -> None:
             if judgement is None or answer is None:
                 _show_fit(page, result, options, whole_models)
                 return
-            page.print(Text(answer.finding, f"bold {COLORS.get(answer.word, '')}".strip()), soft_wrap=True)
-            page.print(Text(f"next: {answer.step}\n", "bold"), soft_wrap=True)
+            answer.show(page)
             _show_fit(page, result, options, whole_models)
             for one in judgement.on:
                 print_held_out(page, one, whole_models, verbose=options.verbose)
-            page.found |= judgement.summary()
+            page.found |= judgement.summary() | {"conclusion": answer.summary()}
             for one in judgement.failures:
                 attempts.failed(one.title, one.why, one.traceback)
             page.warn(warnings)

@@ -7,10 +7,11 @@ from pathlib import Path
 from rich.text import Text
 
 from idbench.experiments.cli.options.jobs import Identify
+from idbench.experiments.document import Conclusion
 from idbench.experiments.errors import ExperimentError, ResultsError
 from idbench.experiments.exports.exports import kind_of
 from idbench.experiments.identification.robot_model import RobotModel
-from idbench.experiments.judgement.judgement import Conclusion, Judgement
+from idbench.experiments.judgement.judgement import Judgement
 from idbench.experiments.recording.audience import Audience
 from idbench.experiments.results.attempts import Attempts
 from idbench.experiments.results.folder import RECORDING, ResultsFolder
@@ -64,7 +65,8 @@ def recording(shown: Shown) -> None:
     from idbench.experiments.results.attempts import write_streams
 
     alone = shown.folder is not None or into is None
-    write_streams(record_log(fit.on(0), shown.audience) if alone else add_layer(run, fit, shown.audience), into)
+    head = shown.answer.markdown(shown.command)
+    write_streams(record_log(fit.on(0), head, shown.audience) if alone else add_layer(run, fit, head, shown.audience), into)
     if len(fit.logs.fitted) > 1:
         shown.page.print(f"recorded: {fit.logs.name(0)}, by the estimate of all logs")
     if into and not shown.folder:

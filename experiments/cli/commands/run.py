@@ -8,7 +8,7 @@ from shlex import quote
 
 from rich.text import Text
 
-from idbench.experiments.cli.command import with_own_parts
+from idbench.experiments.cli.command import command_of, with_own_parts
 from idbench.experiments.cli.commands.inner import doubt_window, recording_of, require_window
 from idbench.experiments.cli.options.jobs import RunCommand
 from idbench.experiments.cli.saving import Files, folder_of, saved, write_scenario
@@ -42,12 +42,15 @@ def run(options: RunCommand) -> None:
             watch = recording.watch if recording else None
             ran = replace(made, progress=lambda share: told(f"simulating, {share:.0%}", share), watch=watch)
             fit = ran.fit
-        _print_run(page, ran, verbose=options.verbose)
+        answer = ran.conclusion(quote(str(folder.out)))
         if isinstance(ran.scenario.drive, ServoDrive):
-            page.print(Text(_as_servos(ran.scenario, folder.out)), soft_wrap=True)
-        with saved(page, folder, ran.summary(), _files(ran), watching.hint(folder.out)) as attempts:
+            answer = replace(answer, step=_as_servos(ran.scenario, folder.out))
+        answer.show(page)
+        _print_run(page, ran, verbose=options.verbose)
+        summary = ran.summary() | {"conclusion": answer.summary()}
+        with saved(page, folder, summary, _files(ran), watching.hint(folder.out)) as attempts:
             if recording:
-                attempts.recording(lambda: recording.finish(ran))
+                attempts.recording(lambda: recording.finish(ran, answer.markdown(command_of(options))))
                 doubt_window(page, options.inner, recording)
                 if fit.logs.long:
                     page.print("the identification is not recorded: the rows of such a long log are not kept")
@@ -68,7 +71,7 @@ def _files(ran: ScenarioRun) -> Files:
 def _as_servos(scenario: Scenario, out: Path) -> str:
     """Return the command that identifies the servos of a run."""
     words = f"{quote(str(out / 'log.parquet'))} --robot {quote(scenario.robot)} --servo {quote(str(out / 'servo.toml'))}"
-    return f"the torque above is that of the motors' currents; from commands and positions alone: {program()} servo {words}"
+    return f"{program()} servo {words} needs no torques, which here are those of the motors' currents"
 
 
 def _print_run(page: Page, ran: ScenarioRun, *, verbose: bool) -> None:

@@ -15,7 +15,7 @@ from idbench.experiments.inputs import files_of
 from idbench.experiments.recording.audience import Audience
 from idbench.experiments.results.attempts import Attempts
 from idbench.experiments.results.folder import ResultsFolder
-from idbench.experiments.results.page import COLORS, NOT_SAVED, Page, stages_of
+from idbench.experiments.results.page import NOT_SAVED, Page, stages_of
 from idbench.experiments.results.writing import write_text
 from idbench.experiments.servo.bam import bam_of
 from idbench.experiments.servo.job import ServosFit, servos_identified
@@ -34,12 +34,10 @@ def servo(options: IdentifyServo) -> None:
     with options.watching.audience() as audience, closing(page), folder.held() if folder else nullcontext():
         page.found |= {"experiment": "servo", "robot": absolute(str(options.robot)), "friction": options.friction, "joints": {}}
         made, document = _identified(page, folder, options)
-        (word, first), *others = document.verdicts
-        page.print(Text(first, f"bold {COLORS.get(word, '')}".strip()), soft_wrap=True)
-        page.print(Text(f"next: {document.step}\n", "bold"), soft_wrap=True)
+        document.conclusion.show(page)
         for table in document.tables:
             table.show(page)
-        for line in (*document.notes, *(line for _, line in others)):
+        for line in (*document.notes, *(line for _, line in document.verdicts)):
             page.print(Text(line), soft_wrap=True)
         page.warn(document.warnings)
         page.show()
@@ -50,7 +48,8 @@ def servo(options: IdentifyServo) -> None:
                 attempts.attempt("--write", lambda path=path: WRITERS[path.suffix](page, options, path, made))  # type: ignore[misc]
             attempts.attempt("summary.json", lambda: save_summary(page, folder))
             if options.watching.rerun and (folder is not None or audience is not None):
-                attempts.recording(lambda: _recorded(made, audience))
+                head = document.conclusion.markdown(command_of(options, out=True))
+                attempts.recording(lambda: _recorded(made, head, audience))
         where = f"written to {folder.out}{options.watching.hint(folder.out)}" if folder else NOT_SAVED
         page.print(where, soft_wrap=True)
 
@@ -118,9 +117,9 @@ WRITERS = {".xml": _write, ".py": _write_function, ".json": _write_bam}
 """What writes servos, by the ending of the name."""
 
 
-def _recorded(fit: ServosFit, audience: Audience | None) -> "Streams":
+def _recorded(fit: ServosFit, head: str, audience: Audience | None) -> "Streams":
     from idbench.experiments.recording.servo_recording import record_servos
 
     servos = fit.others or fit.servos
     path, log = next(iter(servos.logs.items()))
-    return record_servos(servos.links_of(path), path.stem, log, servos.simulated(fit.fits, path), audience)
+    return record_servos(servos.links_of(path), path.stem, log, servos.simulated(fit.fits, path), head, audience)
