@@ -42,7 +42,7 @@ def tables(root):
 
 
 def test_tables_are_made_of_the_results(root, tables):
-    assert {"benchmark.md", "results-estimators.md", "answers.md"} <= set(tables.PAGES)
+    assert {"benchmark.md", "estimators.md", "answers.md"} <= set(tables.PAGES)
     for page in tables.PAGES:
         text = (root / "docs" / page).read_text()
         assert tables.filled(text) == text, f"{page}: uv run python docs/build/tables.py"
@@ -63,7 +63,7 @@ def logs(tmp_path_factory, table1):
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("page", ["python.md", "noise.md", "plugins.md", "loads.md", "virtual-robot.md"])
+@pytest.mark.parametrize("page", ["python.md", "noise.md", "plugins.md", "loads.md"])
 def test_the_code_of_a_page_runs(root, logs, page):
     for code in fenced(root, f"docs/{page}"):
         printed_by("-c", code, cwd=logs)

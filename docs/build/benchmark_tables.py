@@ -119,17 +119,9 @@ def _two(x: float) -> str:
     return f"{x:.0f}" if x >= 100 else f"{x:.2g}"
 
 
-def seconds() -> Iterator[str]:
-    """Yield the seconds of a fit by tool."""
-    head = ["set", *TOOLS.values()]
-    rows = ([row["title"], *(_two(row["seconds"].get(tool, float("nan"))) for tool in TOOLS)] for row in _with_torques())
-    yield from table(head, rows)
-
-
 BENCHMARK_TABLES = {
     "benchmark": overview,
     "benchmark-tools": of_tools,
-    "benchmark-seconds": seconds,
 }
 
 

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from results import DOCS, RESULTS, Cell, cells, table, typical
+from results import DOCS, RESULTS, cells, table, typical
 
 from idbench.experiments.study.ratios import PAIRS, interval
 
@@ -47,9 +47,13 @@ def _cell(row: Ratio | None) -> str:
     return "" if row is None else interval(row)
 
 
-def _of_models(study: str, first: str = "noise") -> Iterator[str]:
+SHOWN = ("OLS", "GLS"), PAIRS[:2]  # Estimators and ratios of the tables; the command prints all
+
+
+def _of_models(study: str, chains: Sequence[str], first: str = "noise") -> Iterator[str]:
     """Yield ratios with their intervals, a row for each noise, chain and estimator."""
-    found = {(r["settings"]["noise"], r["chain"], r["estimator"], *r["models"]): r for r in ratios(study)}
+    shown = (r for r in ratios(study) if r["chain"] in chains and r["estimator"] in SHOWN[0])
+    found = {(r["settings"]["noise"], r["chain"], r["estimator"], *r["models"]): r for r in shown}
 
     def rows() -> Iterator[Sequence[str]]:
         for noise, chain, estimator in dict.fromkeys(key[:3] for key in found):
@@ -57,35 +61,15 @@ def _of_models(study: str, first: str = "noise") -> Iterator[str]:
                 NOISES[noise],
                 chain,
                 estimator,
-                *(_cell(found.get((noise, chain, estimator, *pair))) for pair in PAIRS),
+                *(_cell(found.get((noise, chain, estimator, *pair))) for pair in SHOWN[1]),
             ]
 
-    yield from table([first, "chain", "estimator", *(f"{a} / {b}" for a, b in PAIRS)], rows())
+    yield from table([first, "chain", "estimator", *(f"{a} / {b}" for a, b in SHOWN[1])], rows())
 
 
 def _many_joints() -> Iterator[str]:
     for study, robot in ROBOTS.items():
-        yield from _of_models(study, robot)
-
-
-def _grid(study: str, row: str, column: str, model: str, head: str, **fixed: Any) -> Callable[[], Iterator[str]]:
-    """Return what makes a table of typical errors over two settings, of one model."""
-
-    def made() -> Iterator[str]:
-        found: dict[tuple[Any, Any], Cell] = {}
-        for cell in cells(study):
-            settings = cell["settings"]
-            if cell["model"] == model and all(settings[key] == x for key, x in fixed.items()):
-                found[settings[row], settings[column]] = cell
-        columns = list(dict.fromkeys(c for _, c in found))
-        rows = ([_label(r), *(typical(found[r, c]) for c in columns)] for r in dict.fromkeys(r for r, _ in found))
-        yield from table([head, *map(_label, columns)], rows)
-
-    return made
-
-
-def _label(x: Any) -> str:
-    return f"{x:g}" if isinstance(x, float) else str(x)
+        yield from _of_models(study, ("idbench",), robot)
 
 
 def _windows() -> Iterator[str]:
@@ -124,14 +108,9 @@ def _operations() -> Iterator[str]:
 
 
 CONCLUSION_TABLES: dict[str, Callable[[], Iterator[str]]] = {
-    "models": lambda: _of_models("models"),
+    "models": lambda: _of_models("models", ("idbench", "paper")),
     "models-joints": _many_joints,
     "windows": _windows,
-    "orders": _grid("orders", "chain.prefilter.order", "chain.operator.order", "explicit", "prefilter \\ decimation"),
-    "rules-fs": _grid(
-        "rules", "fs", "chain.prefilter.cutoff", "explicit", "fs [wdyn] \\ wfq [wdyn]", **{"chain.operator.cutoff": 5.0}
-    ),
-    "rules-wfp": _grid("rules", "chain.prefilter.cutoff", "chain.operator.cutoff", "explicit", "wfq \\ wfp [wdyn]", fs=100.0),
     "quality": _quality,
     "operations": _operations,
 }

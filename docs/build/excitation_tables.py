@@ -1,10 +1,10 @@
 """Tables of the studies of excitation."""
 
 import json
-from collections.abc import Callable, Iterator, Sequence
-from math import exp, log, log2
+from collections.abc import Iterator, Sequence
+from math import exp, log
 
-from results import RESULTS, Cell, cells, coverage, table, typical
+from results import RESULTS, Cell, cells, table, typical
 
 CRITERIA = {
     "sigma": "mean ln sigma",
@@ -42,39 +42,6 @@ def criteria() -> Iterator[str]:
 
     heads = [f"{arm}: {what}" for arm in ARMS for what in ("Cond(W)", "predicted", "found")]
     yield from table(["what is optimised", *heads], rows())
-
-
-def ranks() -> Iterator[str]:
-    """Yield how criteria rank random motions."""
-    found = json.loads((RESULTS / "excitation-ranks.json").read_text())
-    rows = (
-        [CRITERIA[c], *(f"{found[arm][c][i]:.2f}" for arm in ARMS for i in (0, 1))] for c in CRITERIA if c in found["scara"]
-    )
-    heads = [f"{arm}: {what}" for arm in ARMS for what in ("rank correlation", "its pick")]
-    yield from table(["criterion", *heads], rows)
-
-
-def motions(study: str, name: str, labels: dict[str, str]) -> Callable[[], Iterator[str]]:
-    """Return what makes the table of a study of motions."""
-
-    def rows() -> Iterator[Sequence[str]]:
-        found = _of_motions(study)
-        for motion, label in labels.items():
-            yield [label, typical(_predicted(motion)), typical(found[motion]), coverage(found[motion])]
-
-    return lambda: table([name, "predicted typical sigma [%]", "found typical error [%]", "coverage"], rows())
-
-
-def coarse() -> Iterator[str]:
-    """Yield what motions come to that were made for coarse encoders."""
-    made = {"scara-sigma": "17 bits", "scara-12bits": "12 bits", "scara-slow": "17 bits, at most 2 rad/s"}
-    found = {
-        (c["settings"]["encoder.lines"], str(c["settings"]["trajectory"]).removeprefix("excited/")): c
-        for c in cells("excitation-coarse")
-    }
-    lines = sorted({line for line, _ in found})
-    rows = ([words, *(typical(found[line, motion]) for line in lines)] for motion, words in made.items())
-    yield from table(["designed for", *(f"{log2(4 * line):g} bits" for line in lines)], rows)
 
 
 def foretold() -> Iterator[str]:

@@ -25,7 +25,9 @@ CAUSE = re.compile(r"^(?:warning|\d+\. [\w ']+): (.*)$", re.MULTILINE)
 STUDY = DOCS.parent / "experiments" / "studies" / "faults.toml"
 PLACE = DOCS / "gallery"
 WIDTH = 1000  # Of a picture [pixels]: signals are read, and fifty of them weigh as much as five recordings
-TITLE = "What each fault looks like"
+PAGE = DOCS / "recordings.md"
+SIGMAS = re.compile(r" \([\d.]+ sigma\)")
+MARK = re.compile(r"<!-- gallery -->\n.*?<!-- end -->", re.DOTALL)
 
 SCENARIOS = {
     "ideal": ("overview", "Nothing: residuals of the size of the noise."),
@@ -114,7 +116,7 @@ def photographed(name: str, client: object) -> None:
 
     out, tab = ran(name), SCENARIOS.get(name, ("overview", ""))[0]
     place = Path(name).absolute()
-    take(client, out, Picture((), "" if tab == "overview" else tab, 0.4), place)
+    take(client, out, Picture((), tab, 0.4), place)
     picture = Image.open(place.with_suffix(".png")).convert("RGB")
     if name.startswith(OF_FAULT):  # torques of the joints, measured and predicted, and residuals
         picture = picture.crop((round(0.555 * picture.width), 0, picture.width, picture.height - 30))
@@ -124,43 +126,35 @@ def photographed(name: str, client: object) -> None:
 
 
 def page() -> str:
-    """Return the page."""
-    lines = [f"# {TITLE}\n"]
-    lines.append(
-        "Each picture is the recording of a run, each quotation what the run prints. `uv run python docs/build/gallery.py` "
-        "makes this page. Where the quotation names something else, or nothing, the doctor does not see the fault at this "
-        "size. Three recordings open [in the page](#three-recordings).\n"
+    """Return what goes into the page."""
+    study = tomllib.loads(STUDY.read_text())["settings"]
+    fault = tomli_w.dumps({**study, "fault": [{"kind": "offset", "joint": "elbow", "size": 0.33}]})
+    return "\n".join(
+        [
+            "Each picture is the recording of a run, each quotation what `run` prints (nothing, if it has none at this size).",
+            "Scenarios: `uv run idbench run NAME`.\n",
+            *(_figure(name, see, name) for name, (_, see) in SCENARIOS.items()),
+            "Faults of two links, with their sizes: the lines below are `fault.toml`; `uv run idbench run fault.toml`.",
+            f"From which size on each is named: [a study](benchmark.md#what-is-wrong).\n\n```toml\n{fault}```\n",
+            *(_figure(name, FAULTS[name.removeprefix(OF_FAULT)], _named(case)) for name, case in _cases().items()),
+        ]
     )
-    lines.append("## Scenarios\n\n`uv run idbench run NAME`, then `uv run idbench view runs/NAME`.\n")
-    lines += [_figure(name, see, f"run {name}") for name, (_, see) in SCENARIOS.items()]
-    lines.append("## Faults\n")
-    settings = {**tomllib.loads(STUDY.read_text())["settings"], "fault": [{"kind": "offset", "joint": "elbow", "size": 0.33}]}
-    lines.append(
-        "Two links, one fault each. `fault.toml` has these lines; then `uv run idbench run fault.toml`. From which size on the "
-        f"cause is named, with how much noise: [the study](results-noise.md).\n\n```toml\n{tomli_w.dumps(settings)}```\n"
-    )
-    lines += [_figure(f"{OF_FAULT}{name}", see, _line(_cases()[f"{OF_FAULT}{name}"])) for name, see in FAULTS.items()]
-    return "\n".join(lines)
 
 
-def _line(case: dict[str, object]) -> str:
+def _named(case: dict[str, object]) -> str:
     (fault,) = case["fault"]  # type: ignore[misc]
-    return ", ".join(f"{key} = {x!r}".replace("'", '"') for key, x in fault.items())  # type: ignore[attr-defined]
+    return f"{fault['kind']}, {fault['size']:g}"  # type: ignore[index]
 
 
-def _figure(name: str, see: str, command: str) -> str:
+def _figure(name: str, see: str, title: str) -> str:
     said = json.loads((PLACE / f"{name}.json").read_text())
-    quoted = f" *{said[0].partition('; once')[0]}*" if said else ""
-    what = name.removeprefix(OF_FAULT)
-    return f"### {what}\n\n![{what}](gallery/{name}.webp)\n\n`{command}`. {see}{quoted}\n"
+    quoted = f" *{SIGMAS.sub('', said[0].split('; ')[0])}*" if said else ""
+    return f"**{title}.** {see}{quoted}\n\n![{name}](gallery/{name}.webp)\n"
 
 
 def write() -> None:
-    """Write the page, with the recordings that open in it."""
-    old = (DOCS / "gallery.md").read_text()
-    begin = old.index("## Three recordings")
-    end = old.find("\n## Pictures", begin)
-    (DOCS / "gallery.md").write_text(f"{page()}\n{old[begin : end if end > 0 else len(old)].rstrip()}\n")
+    """Write the page."""
+    PAGE.write_text(MARK.sub(lambda _: f"<!-- gallery -->\n{page()}<!-- end -->", PAGE.read_text()))
 
 
 if __name__ == "__main__":

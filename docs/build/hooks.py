@@ -123,7 +123,7 @@ def session() -> Iterator[str]:
     """Yield what `import idbench` has."""
     import idbench
 
-    yield "# idbench\n\nWhat `import idbench` has: the jobs of the commands ([15 lines of Python](../python.md)).\n"
+    yield "# idbench\n\nWhat `import idbench` has: the jobs of the commands ([in Python](../python.md)).\n"
     places = {key: place for place, names in idbench.PLACES.items() for key in names}
     yield from (f"::: idbench.{places[key]}.{key}\n" for key in idbench.__all__ if places[key].startswith("experiments"))
 

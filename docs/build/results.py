@@ -90,7 +90,7 @@ def coverage(cell: Cell, key: str = "coverage", digits: int = 0) -> str:
 
 def table(head: Sequence[str], rows: Iterator[Sequence[str]]) -> Iterator[str]:
     """Yield the lines of a table of Markdown, numbers to the right."""
-    yield f"\n| {' | '.join(head)} |\n|---|{'---:|' * (len(head) - 1)}\n"
+    yield f"\n|{'|'.join(head)}|\n|---|{'---:|' * (len(head) - 1)}\n"
     for row in rows:
-        yield f"| {' | '.join(row)} |\n"
+        yield f"|{'|'.join(row)}|\n"
     yield "\n"

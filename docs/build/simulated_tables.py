@@ -143,23 +143,7 @@ def _two(x: float) -> str:
     return f"{x:.1g}" if x < 1e-3 else f"{x:.2g}"
 
 
-def covered() -> Iterator[str]:
-    """Yield the share of parameters within two standard errors of the truth, and seconds of a fit, by arm."""
-    head = ["arm", "imperfection", *TOOLS.values()]
-    rows = [row for row in _kept()["rows"] if row["imperfection"] in TRUE]
-    cells = [[row["arm"], row["imperfection"], *(_inside(row["tools"][tool]) for tool in TOOLS)] for row in rows]
-    noisy = [row for row in rows if row["imperfection"] == TRUE[0]]
-    cells += [[row["arm"], "seconds", *(f"{row['tools'][tool]['seconds']:.2g}" for tool in TOOLS)] for row in noisy]
-    lines = _kept()["lines"]
-    cells += [["", "lines of code", *(str(lines[tool]) for tool in TOOLS)]]
-    yield from table(head, cells)
-
-
-def _inside(of: Row) -> str:
-    return f"{100 * of['inside']:.0f} %" if "inside" in of else ""
-
-
-SIMULATED_TABLES = {"simulated-tools": errors, "simulated-tools-coverage": covered}
+SIMULATED_TABLES = {"simulated-tools": errors}
 
 if __name__ == "__main__":
     keep(Path(sys.argv[1]))

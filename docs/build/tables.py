@@ -19,7 +19,7 @@ from benchmark_tables import BENCHMARK_TABLES
 from conclusion_sentences import sentences
 from conclusion_tables import CONCLUSION_TABLES, keep_conclusion
 from estimator_tables import compared, compared_in_birdys_shape
-from excitation_tables import coarse, criteria, foretold, motions, ranks
+from excitation_tables import criteria, foretold
 from fault_tables import cogging
 from results import DOCS, RESULTS, Cell, Column, by_settings, cells, coverage, keep, table, typical
 from reversal_tables import reversals
@@ -58,11 +58,6 @@ def _lines(settings: dict[str, Any]) -> str:
     return f"{lines:g} ({log2(4 * lines):g} bits)"
 
 
-def _birdy(settings: dict[str, Any]) -> str:
-    position = f"{settings['encoder.noise']:.3g}".replace("e-0", "e-").replace("0.000175", "1.75e-4")
-    return f"{position}, {settings['torque.noise']:g}"
-
-
 def _one(key: str, scale: float = 1.0) -> Callable[[dict[str, Any]], str]:
     return lambda settings: f"{float(f'{scale * settings[key]:.3g}'):g}"
 
@@ -76,14 +71,6 @@ def _sigma() -> Iterator[str]:
                 yield [cell["estimator"], cell["model"], *shares]
 
     yield from table(["estimator", "model", "calibrated", "the paper's"], rows())
-
-
-def _cutoffs() -> Iterator[str]:
-    outer, inner = "chain.prefilter.cutoff", "chain.operator.cutoff"
-    found = {(c["settings"][outer], c["settings"][inner]): typical(c) for c in cells("cutoffs") if c["model"] == "explicit"}
-    operators = sorted({o for _, o in found})
-    rows = ([f"{p:g}", *(found[p, o] for o in operators)] for p in sorted({p for p, _ in found}))
-    yield from table(["prefilter \\ decimation", *(f"{o:g}" for o in operators)], rows)
 
 
 def _bound(study: str, name: str, label: Callable[[dict[str, Any]], str]) -> Callable[[], Iterator[str]]:
@@ -139,34 +126,14 @@ TABLES: dict[str, Callable[[], Iterator[str]]] = {
     "zoo": _zoo,
     "encoder": lambda: _usual("encoder", "lines (counts)", _lines, FOUR),
     "torque-noise": lambda: _usual("torque-noise", "rms [N m]", _one("torque.noise"), FOUR),
-    "birdy": lambda: _usual("birdy", "position [rad], torque [N m]", _birdy, FOUR),
-    "decimation": lambda: _usual("decimation", "cut-off [Hz]", _one("chain.operator.cutoff"), TWO),
     "sample-rate": lambda: _usual("sample-rate", "fs [Hz]", _one("fs"), TWO),
     "ripple": lambda: _usual("ripple", "cogging", _one("ripple.cogging"), TWO),
     "delay": lambda: _usual("delay", "delay [ms]", _one("timing.delay", 1e3), FOUR),
     "sigma": _sigma,
-    "cutoffs": _cutoffs,
     "table2-explicit": _causes("explicit"),
-    "table2-power": _causes("power"),
     "bound-encoder": _bound("bound-encoder", "lines (counts)", _lines),
-    "bound-torque": _bound("bound-torque", "torque noise [N m]", _one("torque.noise")),
     "reversals": reversals,
     "excitation-criteria": criteria,
-    "excitation-ranks": ranks,
-    "excitation-length": motions(
-        "excitation-length",
-        "length [s]",
-        {"scara-5s": "5", "scara-sigma": "10", "scara-20s": "20", "scara-40s": "40"},
-    ),
-    "excitation-frequency": motions(
-        "excitation-frequency",
-        "up to [Hz]",
-        {"scara-0p3Hz": "0.3", "scara-0p5Hz": "0.5", "scara-sigma": "1", "scara-1p5Hz": "1.5", "scara-2Hz": "2"},
-    ),
-    "excitation-kind": motions(
-        "excitation-kind", "kind", {"scara-sigma": "Fourier series", "scara-moves": "point-to-point moves"}
-    ),
-    "excitation-coarse": coarse,
     "excitation-predicted": foretold,
     "estimators-idbench": compared("idbench"),
     "estimators-unfiltered": compared("unfiltered"),

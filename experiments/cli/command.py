@@ -13,6 +13,7 @@ from idbench.experiments.requests.jobs import request_type
 from idbench.experiments.requests.words import word_of
 
 COMMANDS: dict[str, type] = {}  # The commands by name
+GROUPS = ("Identify", "Simulate", "Look", "Extend")  # In the list of commands
 
 
 class Command:
@@ -22,10 +23,12 @@ class Command:
     """File of `idbench.experiments.cli.commands` and function, as in logs:show_log; it receives the options."""
     called: ClassVar[str] = ""
     """Name of the command."""
+    group: ClassVar[str] = ""
+    """Title above it in the list of commands, one of `GROUPS`."""
 
-    def __init_subclass__(cls, called: str = "", action: str = "") -> None:
+    def __init_subclass__(cls, called: str = "", action: str = "", group: str = "") -> None:
         if called:
-            cls.called, cls.action = called, action
+            cls.called, cls.action, cls.group = called, action, group
             COMMANDS[called] = cls
 
     def __call__(self) -> None:

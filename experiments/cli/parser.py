@@ -16,6 +16,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_typ
 from cyclopts import App, Group, Parameter
 from cyclopts.exceptions import CoercionError, CycloptsError, MissingArgumentError, UnknownOptionError, UnusedCliTokensError
 
+from idbench.experiments.cli.command import GROUPS
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.program import program
 from idbench.experiments.requests.words import Word, plain_of, request_keys, word_of
@@ -27,10 +28,16 @@ COUNTS = ("", "", "two", "three", "four", "five", "six")  # Numbers of values th
 CLOSE = 0.7  # Likeness of words from which on one is taken for a slip of the other
 
 
-def app_of(name: str, options: type, shown: Container[str] | None = None, place: int = 0) -> App:
-    """The command of a class of options; its help has all of them, or those that are `shown`."""
+Names = Mapping[str, Sequence[str]]
+"""Names that may stand in the place of a file, or of something of one's own, by the field."""
+
+NAMES: Names = {}  # Only a completion has them: it takes the time of loading what they are of
+
+
+def app_of(name: str, options: type, shown: Container[str] | None = None, place: int = 0, names: Names = NAMES) -> App:
+    """The command of a class of options; its help has all of them, or those that are `shown`, a completion `names`."""
     app = _app(name, options.__doc__ or "", "Help", place)
-    marked = _marked(options, shown, Group("Options"))
+    marked = _marked(options, shown, Group("Options"), names)
 
     def made(asked: Annotated[marked, Parameter(name="*")]) -> Any:  # type: ignore[valid-type]
         return _unmarked(asked)
@@ -69,7 +76,7 @@ def texts_of(options: type) -> dict[str, str]:
     return found
 
 
-def _marked(options: type, shown: Container[str] | None, group: Group) -> type:
+def _marked(options: type, shown: Container[str] | None, group: Group, names: Names) -> type:
     """A class of options with the marks of the library on its fields; those that are typed without a name come first."""
     hints = get_type_hints(options, include_extras=True)
     texts = texts_of(options)
@@ -81,10 +88,13 @@ def _marked(options: type, shown: Container[str] | None, group: Group) -> type:
         plain, whole = plain_of(hint), _stated(hint) is int
         if hasattr(plain, "__dataclass_fields__"):
             of = Group(f"Options: {each.name}", help=texts.get(each.name) or plain.__doc__, sort_key=5)
-            annotations[each.name] = Annotated[_marked(plain, shown, of), Parameter(name="*")]
+            annotations[each.name] = Annotated[_marked(plain, shown, of, names), Parameter(name="*")]
             space[each.name] = field(default_factory=get_args(annotations[each.name])[0], kw_only=True)
             continue
         several = get_origin(plain) is tuple
+        if known := names.get(each.name):
+            choice: Any = Literal[tuple(known)]
+            plain = tuple[choice, ...] if several else choice
         parameter = Parameter(
             name=_names(each.name, word) or None,
             help=texts.get(each.name),
@@ -125,11 +135,13 @@ def _unmarked(made: Any) -> Any:
     return type(made).__mro__[1](**{name: _unmarked(x) if is_dataclass(x) else x for name, x in values.items()})
 
 
-def every_command(commands: Mapping[str, type], description: str) -> App:
-    """All commands as one."""
-    every = _app("idbench", description, "Commands")
+def every_command(commands: Mapping[str, type], description: str, names: Names = NAMES) -> App:
+    """All commands as one, in groups; a completion has `names`."""
+    every, groups = _app("idbench", description, "Help"), {title: Group(title, sort_key=k) for k, title in enumerate(GROUPS)}
     for place, (name, options) in enumerate(commands.items()):
-        every.command(app_of(name, options, None, place))
+        app = app_of(name, options, None, place, names)
+        app.group = groups[getattr(options, "group", GROUPS[0])]
+        every.command(app)
     return every
 
 

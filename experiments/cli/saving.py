@@ -42,6 +42,8 @@ def saved(page: Page, folder: ResultsFolder, summary: dict[str, Any], files: Fil
     `summary` becomes summary.json; `hint` says how to go on, behind the name of the folder.
     """
     page.found |= summary | {"folder": str(folder.out)}
+    if changes := folder.changes(summary):
+        page.print(changes, soft_wrap=True)
     page.show()
     with folder.complete() as hidden:
         for name, write in files.items():

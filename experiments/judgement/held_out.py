@@ -29,7 +29,7 @@ from idbench.sim.robot.robot import Robot
 GOOD, FAIR = 2.0, 10.0
 """Torque errors [% of the torque] beyond noise and sigma up to which a model is called good, or fair.
 
-docs/results-arms.md has the table of right and wrong models from which these come."""
+docs/benchmark.md has the right and wrong models from which these come."""
 
 WORDS = ("good", "fair", "unsure", "poor")  # Verdicts, the worst last
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -122,8 +123,8 @@ def _judged(title: str, make: Callable[[], HeldOut]) -> HeldOut | Unjudged:
 WEAK = 0.1  # Error of a torque constant from which on a log that would not show it is weak
 
 
-def conclusion(judgement: Judgement, warnings: Mapping[str, Sequence[str]]) -> Conclusion:
-    """The answer on the hardest held-out log.
+def conclusion(judgement: Judgement, warnings: Mapping[str, Sequence[str]], written: Sequence[Path] = ()) -> Conclusion:
+    """The answer on the hardest held-out log, of a robot that will be `written` to files.
 
     Jumps of the log come before mistakes, which they cause; other doubts about it only where no mistake is proved.
     """
@@ -134,7 +135,7 @@ def conclusion(judgement: Judgement, warnings: Mapping[str, Sequence[str]]) -> C
     certain = proved or word == "good"
     doubts = (doubt for doubt in map(noted, warnings.get(LOG, ())) if doubt.about == JUMPS or (doubt.option and not certain))
     of_log = str(next(doubts, ""))
-    step = of_log or _next(judgement, warnings)
+    step = of_log or _next(judgement, warnings, written)
     if word == "poor" and judgement.fit.robot_model.assumed:
         step = f"{ASSUMED}: --robot FILE names another"
     finding, *why = _findings(judgement, [] if of_log else causes)
@@ -176,7 +177,7 @@ def _power(fit: Fit) -> Iterator[str]:
             yield f"sees gain errors above {error_percentage(100 * worst)}"
 
 
-def _next(judgement: Judgement, warnings: Mapping[str, Sequence[str]]) -> str:
+def _next(judgement: Judgement, warnings: Mapping[str, Sequence[str]], written: Sequence[Path]) -> str:
     """Next step: what mends the first mistake, beside others; else an option that was proved; else the first doubt."""
     if causes := judgement.fit.diagnosis:
         return remedy_of(causes) if causes[0].remedy else causes[0].mends
@@ -184,7 +185,7 @@ def _next(judgement: Judgement, warnings: Mapping[str, Sequence[str]]) -> str:
     if proved := next((warning for warning in of_delay_and_model if noted(warning).option), ""):
         return proved
     if judgement.good:
-        return "--write arm.urdf arm.json arm.py keeps the robot"
+        return f"use {', '.join(map(str, written))}" if written else "--write arm.urdf arm.json arm.py keeps the robot"
     if first := next((found[0] for found in warnings.values() if found), ""):
         return first
     if judgement.fit.logs.fitted[0].poses:

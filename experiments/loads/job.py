@@ -2,7 +2,7 @@
 
 import json
 import shlex
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -23,7 +23,7 @@ from idbench.experiments.loads import loads_text as text
 from idbench.experiments.loads.known_load import PAYLOAD, LoadJudgement, payload_parameters
 from idbench.experiments.requests.jobs import GainsRequest, LoadRequest, PayloadRequest
 from idbench.experiments.text import printed
-from idbench.identify import Array, IdentificationError
+from idbench.identify import Array
 from idbench.identify.loads.drive_gains import GainEstimate, identify_drive_gains
 from idbench.identify.loads.loaded_robot import LETTERS, LoadedRobot
 from idbench.identify.loads.payload import WAYS, PayloadEstimate, with_known_robot
@@ -40,8 +40,8 @@ class LoadFit:
 
     judgement: LoadJudgement
     """The robot with its logs, read with the gains that were found."""
-    found: Mapping[str, PayloadEstimate | str] | GainEstimate
-    """The payload by the name of the way, or why that gives none; or the gains."""
+    found: PayloadEstimate | GainEstimate
+    """The payload, or the gains."""
     headline: str
     """The same in a line."""
     step: str
@@ -108,7 +108,7 @@ def payload_of(asked: PayloadRequest) -> LoadFit:
         raise ExperimentError(f"--gain-sigma {given}: give a share from 0 to 1, for all {n} joints or for each")
     if asked.before is None:
         notes = (*notes, f"{OF_GAINS}; a payload of known mass shows them: {judgement.gains_command}")
-        return _payload(judgement, notes if not asked.gain_sigma else notes[:-1], _by_ways(judgement, asked))
+        return _payload(judgement, notes if not asked.gain_sigma else notes[:-1], asked.way, _by_way(judgement, asked))
     names, X, C = _before(asked.before)
     if missing := [name for name in names if name not in robot.robot.names]:
         raise ExperimentError(
@@ -116,17 +116,16 @@ def payload_of(asked: PayloadRequest) -> LoadFit:
             f"{', '.join(missing[:3])}; give the options of that identification, such as --add offset or --friction"
         )
     judgement = replace(judgement, before=dict(zip(names, X.tolist(), strict=True)))
-    return _payload(judgement, notes, {"fixed": with_known_robot(robot, names, X, C)})
+    return _payload(judgement, notes, "fixed", with_known_robot(robot, names, X, C))
 
 
-def _payload(judgement: LoadJudgement, notes: Sequence[str], found: Mapping[str, PayloadEstimate | str]) -> LoadFit:
-    ways = {way: payload for way, payload in found.items() if isinstance(payload, PayloadEstimate)}
-    leading, robot_model = next(iter(ways.values())), judgement.request.robot_model
-    lines = (*text.payload_lines(found, leading), *notes)
-    content = {"robot": robot_model.name, **text.payload_summary(found, ways)}
-    table = text.payload_table(ways, robot_model.robot.joints[-1])
+def _payload(judgement: LoadJudgement, notes: Sequence[str], way: str, leading: PayloadEstimate) -> LoadFit:
+    robot_model = judgement.request.robot_model
+    lines = (*text.payload_lines(leading), *notes)
+    content = {"robot": robot_model.name, **text.payload_summary(way, leading)}
+    table = text.payload_table(way, leading, robot_model.robot.joints[-1])
     step = "--write arm-with-load.xml adds the payload to the robot's file"
-    return LoadFit(judgement, found, text.words_of_payload(leading), step, table, lines, content, leading)
+    return LoadFit(judgement, leading, text.words_of_payload(leading), step, table, lines, content, leading)
 
 
 def gains_of(asked: GainsRequest) -> LoadFit:
@@ -182,24 +181,11 @@ def _loaded(asked: LoadRequest) -> tuple[LoadJudgement, tuple[str, ...]]:
     return LoadJudgement(robot, request, loaded.names, gain, _gains_command(asked)), tuple(notes)
 
 
-def _by_ways(judgement: LoadJudgement, asked: PayloadRequest) -> dict[str, PayloadEstimate | str]:
-    """Return the payload by the ways that are asked for, or why one has none; raise if none has."""
-    robot, sigma = judgement.robot, np.broadcast_to(asked.gain_sigma or 0.0, judgement.robot.tree.n)
-    if not robot.without:
+def _by_way(judgement: LoadJudgement, asked: PayloadRequest) -> PayloadEstimate:
+    """Return the payload; its covariance has what torque constants contribute: C + sum over joints sigma^2 dX/dg (dX/dg)'."""
+    if not judgement.robot.without:
         raise ExperimentError("give logs without the payload (--unloaded), or the robot as it was identified before (--before)")
-    found = dict[str, PayloadEstimate | str]()
-    for way in WAYS if asked.way == "all" else (asked.way,):
-        try:
-            found[way] = _with_gains(WAYS[way], judgement, sigma)
-        except IdentificationError as error:
-            found[way] = str(error)
-    if not any(isinstance(each, PayloadEstimate) for each in found.values()):
-        raise ExperimentError(str(next(iter(found.values()))))
-    return found
-
-
-def _with_gains(way: Callable[[LoadedRobot], PayloadEstimate], judgement: LoadJudgement, sigma: Array) -> PayloadEstimate:
-    """Return a payload whose covariance has what torque constants contribute: C + sum over joints sigma^2 dX/dg (dX/dg)'."""
+    sigma, way = np.broadcast_to(asked.gain_sigma or 0.0, judgement.robot.tree.n), WAYS[asked.way]
     found, C = way(judgement.robot), 0.0
     for j in np.flatnonzero(sigma):
         ratio = np.ones(len(sigma))

@@ -1,6 +1,6 @@
 """Payloads and gains as tables, lines and summaries."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -20,19 +20,15 @@ UNITS = {x: unit for x, (_, unit) in zip(LETTERS, KINDS.values(), strict=True)}
 """Units of the parameters of a payload."""
 
 
-def payload_table(ways: Mapping[str, PayloadEstimate], link: str) -> Listing:
-    """Table of the payload as each way has it."""
-    cells = [
-        {name: concise(x, sigma) for name, x, sigma in zip(p.names, p.X.tolist(), p.sigma.tolist(), strict=True)}
-        for p in ways.values()
-    ]
-    rows = [(name, UNITS.get(name, ""), *(values[name] for values in cells)) for name in next(iter(ways.values())).names]
-    return Listing(f"payload, about the origin of the frame of {link}", ("", "unit", *ways), tuple(rows), 2)
+def payload_table(way: str, p: PayloadEstimate, link: str) -> Listing:
+    """Table of the payload."""
+    each = zip(p.names, p.X.tolist(), p.sigma.tolist(), strict=True)
+    rows = tuple((name, UNITS.get(name, ""), concise(x, sigma)) for name, x, sigma in each)
+    return Listing(f"payload, about the origin of the frame of {link}", ("", "unit", way), rows, 2)
 
 
-def payload_lines(found: Mapping[str, PayloadEstimate | str], leading: PayloadEstimate) -> Iterator[str]:
-    """Yield why some ways have no estimate, what was known, and the body that agrees best with the leading way."""
-    yield from (f"{way}: no estimate: {why}" for way, why in found.items() if isinstance(why, str))
+def payload_lines(leading: PayloadEstimate) -> Iterator[str]:
+    """Yield what was known, and the body that agrees best."""
     if leading.known:
         yield "known: " + ", ".join(f"{name} = {x:.5g}" for name, x in leading.known.items())
     if negative_mass(leading):
@@ -75,26 +71,16 @@ def body_of(payload: PayloadEstimate) -> dict[str, Any]:
     }
 
 
-def payload_summary(found: Mapping[str, PayloadEstimate | str], ways: Mapping[str, PayloadEstimate]) -> dict[str, Any]:
-    """Summary of a payload, as each way has it."""
-    leading = next(iter(ways.values()))
+def payload_summary(way: str, p: PayloadEstimate) -> dict[str, Any]:
+    """Summary of a payload."""
+    each = zip(p.names, p.X.tolist(), p.sigma.tolist(), strict=True)
+    named = {name: {"value": x, "sigma": sigma, "unit": UNITS.get(name, "")} for name, x, sigma in each}
+    values = {"estimate": p.X.tolist(), "sigma": p.sigma.tolist(), "covariance": p.covariance.tolist()}
     return {
-        "parameters": list(leading.names),
-        "known": dict(leading.known),
-        "ways": {
-            way: {
-                "parameters": {
-                    name: {"value": x, "sigma": sigma, "unit": UNITS.get(name, "")}
-                    for name, x, sigma in zip(p.names, p.X.tolist(), p.sigma.tolist(), strict=True)
-                },
-                "estimate": p.X.tolist(),
-                "sigma": p.sigma.tolist(),
-                "covariance": p.covariance.tolist(),
-            }
-            for way, p in ways.items()
-        },
-        "failures": {way: why for way, why in found.items() if isinstance(why, str)},
-        "body": body_of(leading),
+        "parameters": list(p.names),
+        "known": dict(p.known),
+        "ways": {way: {"parameters": named, **values}},
+        "body": body_of(p),
     }
 
 

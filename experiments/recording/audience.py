@@ -11,13 +11,15 @@ from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
-from urllib.parse import quote, urlsplit
+from urllib.parse import urlsplit
 
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.program import program
-from idbench.experiments.requests.words import Count, Real, Url
+from idbench.experiments.requests.words import Real, Url
 
 LOOPBACK = "127.0.0.1"
+
+IN_BROWSER = f"`uv run rerun --serve-web --bind {LOOPBACK}` shows it in a browser: add --connect with the URL that it prints"
 
 PATIENCE = 20.0  # How long a viewer may take to start, or to take what is on its way to it [s]
 
@@ -58,7 +60,7 @@ def viewer_binary() -> Path:
 def require_display() -> None:
     """Raise ExperimentError if no window can be opened."""
     if sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
-        raise ExperimentError("there is no display here: use --serve and a browser, or --connect URL to a viewer elsewhere")
+        raise ExperimentError("there is no display here: " + IN_BROWSER)
 
 
 def start_viewer() -> str:
@@ -71,7 +73,7 @@ def start_viewer() -> str:
     return f"rerun+http://{LOOPBACK}:{port}/proxy"
 
 
-def _start(options: list[str], port: int) -> "subprocess.Popen[bytes]":
+def _start(options: list[str], port: int) -> None:
     quiet, binary = subprocess.DEVNULL, viewer_binary()
     words = [str(binary), "--bind", LOOPBACK, *options]
     try:
@@ -82,42 +84,12 @@ def _start(options: list[str], port: int) -> "subprocess.Popen[bytes]":
     try:
         while not answers(f"rerun+http://{LOOPBACK}:{port}/proxy"):
             if viewer.poll() is not None or time.perf_counter() > end:
-                raise ExperimentError("the rerun viewer does not start: use --serve and a browser, or leave --live out")
+                raise ExperimentError("the rerun viewer does not start: leave --live out; " + IN_BROWSER)
             time.sleep(0.05)
     except BaseException:  # also Ctrl-C: nothing that was begun stays behind
-        _stop(viewer)
+        viewer.terminate()
+        viewer.wait()
         raise
-    return viewer
-
-
-def _stop(viewer: "subprocess.Popen[bytes]") -> None:
-    viewer.terminate()
-    viewer.wait()
-
-
-@contextmanager
-def served(web: int) -> Iterator[str]:
-    """Serve the web viewer; give where it listens for data."""
-    for port in (web, web + 1):
-        _require_free(port)
-    server = _start(["--serve-web", "--port", f"{web + 1}", "--web-viewer-port", f"{web}"], web + 1)
-    url = f"rerun+http://{LOOPBACK}:{web + 1}/proxy"
-    try:
-        sys.stderr.write(f"idbench: watch it at http://{LOOPBACK}:{web}/?url={quote(url, safe='')}\n")
-        yield url
-    finally:
-        _stop(server)
-
-
-def _require_free(port: int) -> None:
-    try:
-        with closing(socket.socket()) as probe:
-            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            probe.bind((LOOPBACK, port))
-    except (OSError, OverflowError) as error:
-        raise ExperimentError(
-            f"port {port} cannot be used ({error}): give another with --port, which takes two in a row"
-        ) from None
 
 
 if TYPE_CHECKING:
@@ -125,7 +97,6 @@ if TYPE_CHECKING:
 
 GOODBYE = 10.0  # How long a viewer may take to take what is still on its way to it, at the end [s]
 DEAF = 6  # How often in a row a viewer may fail to take what is sent within half a second
-PORT = 9090  # Port of the web viewer
 
 
 @dataclass(frozen=True)
@@ -136,27 +107,19 @@ class Watching:
     """Show everything live in a rerun viewer."""
     connect: Url = None
     """Show everything live in a running viewer, such as rerun+http://127.0.0.1:9876/proxy."""
-    serve: bool = False
-    """Show everything live in a browser: serve the web viewer on this machine until Ctrl-C."""
-    port: Count = None
-    """Port of the web viewer. Default: 9090; data use the next port."""
     pace: Real = None
     """Simulated seconds per second of live view, such as 1.0. Default: as fast as possible."""
     rerun: bool = True
     """Write a recording."""
 
     def __post_init__(self) -> None:
-        ways = [name for name, given in (("--live", self.live), ("--connect", self.connect), ("--serve", self.serve)) if given]
+        ways = [name for name, given in (("--live", self.live), ("--connect", self.connect)) if given]
         if len(ways) > 1:
             raise ExperimentError(f"{' and '.join(ways)} name several viewers: give one")
         if self.pace is not None and not (0 < self.pace < float("inf")):
             raise ExperimentError(f"--pace {self.pace:g} must be above 0: 1.0 is real time")
         if self.pace is not None and not ways:
-            raise ExperimentError(f"--pace {self.pace:g} needs somebody who watches: add --live, --serve or --connect URL")
-        if self.port is not None and not self.serve:
-            raise ExperimentError(f"--port {self.port} is that of the web viewer: add --serve, or leave it out")
-        if self.port is not None and not 0 < self.port < 65535:
-            raise ExperimentError(f"--port {self.port} must be between 1 and 65534; data go through the port after it")
+            raise ExperimentError(f"--pace {self.pace:g} needs somebody who watches: add --live or --connect URL")
         if ways and not self.rerun:
             raise ExperimentError(f"{ways[0]} and --no-rerun contradict each other: give one")
 
@@ -166,7 +129,7 @@ class Watching:
 
     @contextmanager
     def audience(self) -> Iterator["Audience | None"]:
-        """Give who watches, if anybody does; a web viewer is served until Ctrl-C once the block is done.
+        """Give who watches, if anybody does.
 
         Raises
         ------
@@ -177,14 +140,6 @@ class Watching:
             yield Audience(reachable(self.connect), self.pace)
         elif self.live:
             yield Audience(start_viewer(), self.pace)
-        elif self.serve:
-            with served(PORT if self.port is None else self.port) as url:
-                yield Audience(url, self.pace)
-                sys.stderr.write("idbench: done; served until Ctrl-C\n")
-                with suppress(KeyboardInterrupt):
-                    while True:
-                        time.sleep(3600)
-                sys.stderr.write("\n")
         else:
             yield None
 

@@ -89,12 +89,12 @@ def friction_figure(fit: Fit) -> str:
         v, _, torque, weight = curves.rows(j)
         v, torque = v[weight > WHOLE], torque[weight > WHOLE]
         panel = Panel(f"{joint}: {' + '.join(fit.robot_model.laws.names[j])}")
-        panel.dots(v, torque, "#999999", 1.0, "torque minus that of the links")
         for number, (speeds, friction) in enumerate(curves.laws(j)):
             inside = (speeds >= v.min(initial=0.0)) & (speeds <= v.max(initial=0.0))
             labels = ("", "") if number else ("estimated law", "beyond the speeds of the log")
             panel.line(speeds, np.where(inside, friction, np.nan), color_of("explicit"), 1.6, labels[0])
             panel.line(speeds, np.where(inside, np.nan, friction), color_of("power"), 1.6, labels[1], "2 3")
+        panel.dots(v, torque, "#777777", 0.8, "torque minus that of the links")  # in front of lines, which would hide them
         panels.append(panel)
     force, ways = all_units(fit.robot_model)
     return figure(panels, 1.6, f"velocity [{ways.replace(',', '/s,')}/s]", f"friction [{force}]")

@@ -42,8 +42,8 @@ def parameter_rows(fit: Fit) -> Iterator[dict[str, str]]:
     stated = fit.truth or {name: x for name, x in filed_values.items() if abs(x) > ROUNDING}
     reach = interval_reach(fit)
     made, joints = fit.robot_model.grouping.groupings, fit.robot_model.robot.joints
-    for i in fit.basis.without_random_effects:
-        parameter = fit.basis.parameters[i]
+    places = {i: fit.basis.parameters[i] for i in fit.basis.without_random_effects}
+    for i, parameter in sorted(places.items(), key=lambda of: len(joints) if of[1].joint is None else of[1].joint):
         x, sigma = float(lead.X[i]), float(lead.standard_errors[i])
         filed = stated.get(parameter.name)
         yield {

@@ -68,9 +68,8 @@ class PayloadRequest(LoadRequest):
 
     before: words.File = None
     """A robot identified earlier (`idbench identify --write FILE.json`), instead of logs without the payload."""
-    way: Literal["all", "together", "fixed", "apart", "difference"] = "together"
-    """together: all logs in one fit (best); fixed: first the robot, then the payload; apart: two fits, subtracted; difference:
-    of the torques of one repeated motion; all: compare them."""
+    way: Literal["together", "fixed"] = "together"
+    """together: all logs in one fit; fixed: first the robot, then the payload."""
     gain_sigma: words.Each = ()
     """Standard deviation of the torque constants, as a share of them (0.01 is 1 %), of all joints or of each: it becomes part
     of that of the payload, in which a wrong torque constant looks like mass."""

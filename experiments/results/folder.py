@@ -6,6 +6,7 @@ from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
 from fnmatch import fnmatch
 from pathlib import Path
+from typing import Any
 
 from idbench.experiments.errors import REPORT, ResultsError
 from idbench.experiments.results.writing import NAME, Manifest, Read, WrittenFile, digest, exchange, hidden_folder, locked
@@ -92,6 +93,19 @@ class ResultsFolder:
             for folder in made:  # where nothing came into them
                 with suppress(OSError):
                     folder.rmdir()
+
+    def changes(self, summary: Mapping[str, Any]) -> str:
+        """Return the parameter that differs most from the results that are there, in words; empty if none does."""
+        moved = list[tuple[float, str]]()
+        with suppress(OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):  # whatever the file is
+            before = json.loads((self.out / "summary.json").read_text(encoding="utf-8"))["models"]
+            for model, found in summary["models"].items():
+                for name, p in found["parameters"].items():
+                    if (old := before[model]["parameters"][name]["value"]) != p["value"]:
+                        words = f"{name} of the {model} model from {old:.5g} to {p['value']:.5g} {p['unit']}"
+                        moved.append((abs(p["value"] - old) / p["sigma"], words))
+        size, most = max(moved, default=(0.0, ""))
+        return f"changed since the last results there: {most} ({size:.2g} sigma), the most of {len(moved)}" if most else ""
 
     def complete(self) -> AbstractContextManager[Path]:
         """Give a hidden folder to write results to; on success they take the place of all earlier ones, summary.json last.

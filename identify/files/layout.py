@@ -192,7 +192,7 @@ class LogLayout:
             lines += [f"period = {self.torque.period!r}"] if self.torque.period else []
             lines += [f"lags = {list(self.torque.lags)}"] if self.torque.lags else []
         else:
-            lines += ['# meaning = "held"  # or "instantaneous", "averaged": see docs/torque.md', "# delay = 0.0  # [s]"]
+            lines += ['# meaning = "held"  # or "instantaneous", "averaged": see docs/your-own-log.md', "# delay = 0.0  # [s]"]
         unit = self.tau.unit or SI["tau"]
         lines += [f"gain = {list(self.gain)}"] if self.gain else [f"# gain = [1.0]  # N m per {unit}, of all joints or of each"]
         if self.motors:

@@ -1,25 +1,23 @@
-"""Four ways to the parameters of a payload.
+"""Ways to the parameters of a payload.
 
 W. Khalil, M. Gautier and P. Lemoine, "Identification of the payload inertial parameters of industrial manipulators", IEEE ICRA
-2007, compare them on a real arm.
+2007, compare them with two others on a real arm: two fits, subtracted, and the difference of torques, which err more.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import scipy
 
 from idbench.identify.arrays import Array
-from idbench.identify.data.kinematics import INERTIAL
-from idbench.identify.errors import IdentificationError, LogError
+from idbench.identify.errors import IdentificationError
 from idbench.identify.estimators.estimate import Estimate
 from idbench.identify.estimators.problem import Problem
 from idbench.identify.loads.loaded_robot import LETTERS, LoadedRobot, marked, of_payload
 from idbench.identify.models import ExplicitModel
 from idbench.identify.parameters.bodies import inertial, pseudo_inertia
 
-REPEATED = 0.05  # Rms distance of two motions [rad or m] up to which they count as one that was repeated
 MIN_EIGENVALUE = 1e-6  # Least eigenvalue of a body's pseudo-inertia, as a share of the largest
 
 
@@ -110,54 +108,8 @@ def with_robot_held(robot: LoadedRobot, values: Mapping[str, float]) -> Estimate
     return robot.estimated(marked(robot.loaded, 1.0), held)
 
 
-def apart(robot: LoadedRobot) -> PayloadEstimate:
-    """Identify the robot twice, without and with the payload as a part of its last link, and subtract."""
-    basis = robot.robot.basis
-    first, second = robot.estimated(robot.without, basis), robot.estimated(robot.loaded, basis)
-    T, known = _as_link(robot)
-    difference, C = second.X - first.X - known, first.covariance + second.covariance
-    rows = [i for i, name in enumerate(basis.names) if np.any(T[i])]
-    A, root = T[rows], np.linalg.cholesky(C[np.ix_(rows, rows)])
-    W, y = (scipy.linalg.solve_triangular(root, x, lower=True) for x in (A, difference[rows]))
-    covariance = np.linalg.inv(W.T @ W)
-    return PayloadEstimate(robot.names, covariance @ W.T @ y, covariance, robot.known)
-
-
-def difference(robot: LoadedRobot) -> PayloadEstimate:
-    """Identify the payload from the difference of the torques of one motion, repeated: friction falls out of it.
-
-    X(k+1) = argmin |w(k) (Y_loaded - Y_without - W X)|, w(k) one over the rms residual of each joint.
-    """
-    same = [
-        one.q.shape == other.q.shape and np.sqrt(np.mean((one.q - other.q) ** 2)) < REPEATED
-        for one, other in zip(robot.without, robot.loaded, strict=False)
-    ]
-    if not same or len(robot.without) != len(robot.loaded) or not all(same):
-        raise LogError(
-            "the logs with the payload do not repeat those without it, sample by sample, on which the difference of "
-            "torques rests: use another way"
-        )
-    first = Problem(marked(robot.without, 0.0), robot.robot.basis, ExplicitModel(), robot.chain).rows
-    own = robot.basis.of(robot.basis.named(*robot.names))
-    problem = Problem(marked(robot.loaded, 1.0), own, ExplicitModel(), robot.chain)
-    rows = problem.rows  # what is known of the payload is out of their Y
-    factors = replace(rows, Y=rows.Y - first.Y).factors_of(np.asarray(rows.valid & first.valid, dtype=np.float64))
-    factors.together.check()
-    covariance = factors.fit(2).factor.inverse(np.array(True))
-    return PayloadEstimate(robot.names, factors.fit(1).X, covariance, robot.known)
-
-
-WAYS: Mapping[str, Callable[[LoadedRobot], PayloadEstimate]] = {f.__name__: f for f in (together, fixed, apart, difference)}
-"""The four ways by name, the best first."""
-
-
-def _as_link(robot: LoadedRobot) -> tuple[Array, Array]:
-    """Return T, which makes of the payload's free parameters what they add to the robot's, and what known ones add."""
-    own, names = [robot.standard.names.index(f"{letters}{robot.tree.n}") for letters in INERTIAL], list(robot.payload)
-    # What ten parameters of the link add, by those of the payload.
-    T = robot.robot.K[:, own] @ np.linalg.pinv(np.array(list(robot.payload.values())))
-    free = [names.index(name) for name in robot.names]
-    return T[:, free], T @ np.array([robot.known.get(name, 0.0) for name in names])
+WAYS: Mapping[str, Callable[[LoadedRobot], PayloadEstimate]] = {f.__name__: f for f in (together, fixed)}
+"""The ways by name, the best first."""
 
 
 def _outer(lower: Array) -> Array:

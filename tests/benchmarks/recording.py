@@ -7,6 +7,7 @@ is printed, of the simulation and of the whole: simulate, identify, record, writ
 """
 
 import statistics
+import subprocess
 import tempfile
 import time
 from dataclasses import replace
@@ -18,7 +19,7 @@ from timing import seconds as timed
 
 from idbench.experiments.identification.request import Request
 from idbench.experiments.identification.scenario_run import ScenarioRun
-from idbench.experiments.recording.audience import Audience, served
+from idbench.experiments.recording.audience import LOOPBACK, Audience, answers, viewer_binary
 from idbench.experiments.recording.identification_recording import RunRecording
 from idbench.experiments.recording.motion_layer import Base
 from idbench.experiments.results.attempts import write_streams
@@ -92,12 +93,16 @@ def send_inner(base: Base, inner: Inner, path: Path) -> None:
 def watched(name: str, times: int) -> None:
     """Compare runs that are watched with runs that nobody watches, alternating."""
     described, seconds = load(name), {"simulated": ([], []), "all": ([], [])}
-    with served(9321) as url, tempfile.TemporaryDirectory() as folder:
+    words, url = [viewer_binary(), "--serve-web", "--bind", LOOPBACK, "--port", "9322"], f"rerun+http://{LOOPBACK}:9322/proxy"
+    with subprocess.Popen(words) as server, tempfile.TemporaryDirectory() as folder:
+        while not answers(url):
+            time.sleep(0.05)
         for _ in range(times):
             for k, audience in enumerate((None, Audience(url))):
                 simulated, everything = once(described, audience, Path(folder))
                 seconds["simulated"][k].append(simulated)
                 seconds["all"][k].append(everything)
+        server.terminate()
     for what, (alone, seen) in seconds.items():
         ratio = statistics.median(seen) / statistics.median(alone)
         print(f"{name}, {what}: {statistics.median(alone):.2f} s alone, watched {ratio:.3f} times that")

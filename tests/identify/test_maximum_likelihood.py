@@ -115,7 +115,7 @@ def test_the_right_hand_side_is_the_slope_of_the_cost(exact, truth):
     ("position", "torque", "most"), [(BITS16, 0.0, 0.25), (16 * BITS16, 0.0, 0.2), (BITS16, 0.01, 0.9), (BITS16, 0.1, 1.1)]
 )
 def test_errors_against_weighted_least_squares(position, torque, most, exact, truth):
-    """Typical errors of 12 motions, each known to a fifth, and sigma: the table of docs/results-noise.md has 64."""
+    """Typical errors of 12 motions, each known to a fifth, and sigma: the table of docs/noise.md has 64."""
     log = noisy(exact, position, torque)
     weighted, likely = (identify(log, scara(), EXPLICIT, estimator=each) for each in (WeightedLeastSquares(), ML))
     error, other = (np.sqrt(np.mean((found.X - truth) ** 2, axis=0)) for found in (likely, weighted))

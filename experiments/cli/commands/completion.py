@@ -2,15 +2,24 @@
 
 from rich.text import Text
 
+from idbench import models
 from idbench.experiments.cli.app import DESCRIPTION
 from idbench.experiments.cli.command import COMMANDS
 from idbench.experiments.cli.options.tools import Completion
 from idbench.experiments.cli.parser import every_command
+from idbench.experiments.identification.friction_laws import AUTO, GROUPS, SMOOTH
 from idbench.experiments.results.page import Page
+from idbench.experiments.study.study_file import names as studies
+from idbench.identify import BLOCKS, CHAINS, ESTIMATORS, MODELS
+from idbench.sim.scenario.scenario_file import names as scenarios
 
 
 def complete(options: Completion) -> None:
     """Print the script; bash names files where there are no words."""
-    page, script = Page(), every_command(COMMANDS, DESCRIPTION).generate_completion(shell=options.shell)
+    every: dict[str, list[str] | tuple[str, ...]] = {"loop": scenarios(), "like": scenarios(), "scenario": scenarios()}
+    every |= {"study": studies(), "robot": models.names(), "model": [*MODELS, "all"], "chain": [*CHAINS]}
+    laws = [AUTO, SMOOTH, *GROUPS, *BLOCKS]
+    names = every | {"estimator": [*ESTIMATORS], "friction": laws, "add": [*BLOCKS]}
+    page, script = Page(), every_command(COMMANDS, DESCRIPTION, names).generate_completion(shell=options.shell)
     page.print(Text(script.replace("complete -F ", "complete -o default -F ")), soft_wrap=True)
     page.close()

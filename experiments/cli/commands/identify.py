@@ -43,11 +43,12 @@ def identify(options: Identify) -> None:
         kept = f"the estimates are printed{f', and with the logs in {folder.out}' if folder else ''}"
         with Attempts(kept, folder) as attempts:
             try:
+                changes = folder.changes(page.found) if folder else ""
                 _save(folder, page, result)
                 with stages_of("judging" if options.validate else "judging, by a fit of the rest"):
                     judgement = attempts.attempt("the verdict", lambda: judge(result))
                 warnings = {} if judgement is None else _checked(judgement, options, attempts)
-                answer = None if judgement is None else conclusion(judgement, warnings)
+                answer = None if judgement is None else conclusion(judgement, warnings, options.write)
             except BaseException:  # whatever ends it, the estimates are worth keeping
                 _show_fit(page, result, options, whole_models)
                 raise
@@ -62,6 +63,8 @@ def identify(options: Identify) -> None:
             for one in judgement.failures:
                 attempts.failed(one.title, one.why, one.traceback)
             page.warn(warnings)
+            if changes:
+                page.print(Text(changes), soft_wrap=True)
             attempts.attempt("summary.json", lambda: _save(folder, page))
             page.end()
             view_all(Shown(page, options, command, judgement, answer, warnings, folder, audience), attempts)

@@ -30,7 +30,7 @@ class RecordedOptions(WrittenOptions):
 
 
 @dataclass(frozen=True, kw_only=True)
-class RunCommand(jobs.RunRequest, RecordedOptions, Command, called="run", action="run:run"):
+class RunCommand(jobs.RunRequest, RecordedOptions, Command, called="run", action="run:run", group="Simulate"):
     """Simulate a scenario in closed loop, identify it with all models, and record it."""
 
     out: Folder = None
@@ -44,7 +44,7 @@ class RunCommand(jobs.RunRequest, RecordedOptions, Command, called="run", action
 
 
 @dataclass(frozen=True, kw_only=True)
-class Identify(jobs.IdentifyRequest, RecordedOptions, Command, called="identify", action="identify:identify"):
+class Identify(jobs.IdentifyRequest, RecordedOptions, Command, called="identify", action="identify:identify", group="Identify"):
     """Identify a log, or several logs in one fit: columns t, q1, ..., tau1, ... in SI units, or as log.toml states."""
 
     essential: ClassVar[tuple[str, ...]] = (
@@ -65,7 +65,7 @@ class Identify(jobs.IdentifyRequest, RecordedOptions, Command, called="identify"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Table1Command(jobs.Table1Request, RecordedOptions, Command, called="table1", action="paper:compare"):
+class Table1Command(jobs.Table1Request, RecordedOptions, Command, called="table1", action="paper:compare", group="Simulate"):
     """Reproduce the paper's simulation comparison (Table 1) and record it."""
 
     out: Folder = None
@@ -73,7 +73,7 @@ class Table1Command(jobs.Table1Request, RecordedOptions, Command, called="table1
 
 
 @dataclass(frozen=True, kw_only=True)
-class Table2Command(jobs.Table2Request, RecordedOptions, Command, called="table2", action="paper:table2"):
+class Table2Command(jobs.Table2Request, RecordedOptions, Command, called="table2", action="paper:table2", group="Simulate"):
     """Repeat the paper's experiment (Table 2) on the virtual robot, and attribute its errors; takes two minutes."""
 
     out: Path = Path("runs/table2")
@@ -83,7 +83,7 @@ class Table2Command(jobs.Table2Request, RecordedOptions, Command, called="table2
 
 
 @dataclass(frozen=True, kw_only=True)
-class SearchCommand(Command, called="search", action="paper:search"):
+class SearchCommand(Command, called="search", action="paper:search", group="Simulate"):
     """Search a trajectory with the paper's condition numbers. (`idbench excite` designs better ones.)"""
 
     seed: int = 0
@@ -97,7 +97,7 @@ class SearchCommand(Command, called="search", action="paper:search"):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Excite(jobs.ExciteRequest, RecordedOptions, Command, called="excite", action="excite:excite"):
+class Excite(jobs.ExciteRequest, RecordedOptions, Command, called="excite", action="excite:excite", group="Identify"):
     """Design an exciting trajectory within the robot's limits."""
 
     out: Folder = None
@@ -105,7 +105,7 @@ class Excite(jobs.ExciteRequest, RecordedOptions, Command, called="excite", acti
 
 
 @dataclass(frozen=True, kw_only=True)
-class IdentifyPayload(jobs.PayloadRequest, WrittenOptions, Command, called="payload", action="loads:payload"):
+class IdentifyPayload(jobs.PayloadRequest, WrittenOptions, Command, called="payload", action="loads:payload", group="Identify"):
     """Identify what the gripper holds: mass, first moments, inertia, from logs with it and logs without it."""
 
     write: Files = ()
@@ -113,7 +113,7 @@ class IdentifyPayload(jobs.PayloadRequest, WrittenOptions, Command, called="payl
 
 
 @dataclass(frozen=True, kw_only=True)
-class IdentifyGains(jobs.GainsRequest, WrittenOptions, Command, called="gains", action="loads:gains"):
+class IdentifyGains(jobs.GainsRequest, WrittenOptions, Command, called="gains", action="loads:gains", group="Identify"):
     """Identify the torque constants of the drives, gears included, from logs of currents with and without a known payload.
 
     Currents are read with --gain as a first guess, or with 1.
@@ -121,7 +121,7 @@ class IdentifyGains(jobs.GainsRequest, WrittenOptions, Command, called="gains", 
 
 
 @dataclass(frozen=True, kw_only=True)
-class IdentifyServo(jobs.ServoRequest, RecordedOptions, Command, called="servo", action="servo:servo"):
+class IdentifyServo(jobs.ServoRequest, RecordedOptions, Command, called="servo", action="servo:servo", group="Identify"):
     """Identify joints under position loops (servos, legs, MuJoCo's actuators) from commands and positions; write them."""
 
     write: Files = ()
@@ -132,7 +132,7 @@ class IdentifyServo(jobs.ServoRequest, RecordedOptions, Command, called="servo",
 
 
 @dataclass(frozen=True, kw_only=True)
-class StudyCommand(jobs.StudyRequest, RecordedOptions, Command, called="study", action="study:study"):
+class StudyCommand(jobs.StudyRequest, RecordedOptions, Command, called="study", action="study:study", group="Simulate"):
     """Run a study: simulate a scenario over a grid and many seeds, and identify each run. Without a name: list the studies."""
 
     out: Folder = None

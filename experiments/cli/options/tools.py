@@ -11,7 +11,7 @@ from idbench.experiments.requests.words import Word
 
 
 @dataclass(frozen=True)
-class View(Command, called="view", action="view:view"):
+class View(Command, called="view", action="view:view", group="Look"):
     """Open the recording of a results folder in the rerun viewer, or overlay those of several."""
 
     folders: Annotated[tuple[Path, ...], Word("DIR|FILE", positional=True)] = ()
@@ -26,7 +26,7 @@ class View(Command, called="view", action="view:view"):
 
 
 @dataclass(frozen=True)
-class ShowLog(Command, called="log", action="logs:show_log"):
+class ShowLog(Command, called="log", action="logs:show_log", group="Look"):
     """Show the contents of a log: columns, units, rate, clock, ranges, noise, encoders. Needs no robot."""
 
     log: words.Log
@@ -44,7 +44,7 @@ class ShowLog(Command, called="log", action="logs:show_log"):
 
 
 @dataclass(frozen=True)
-class Resample(Command, called="resample", action="logs:resample"):
+class Resample(Command, called="resample", action="logs:resample", group="Look"):
     """Resample a log at a fixed frequency and repair its clock: repeated rows, jitter, missing samples, gaps."""
 
     log: words.Log
@@ -63,7 +63,7 @@ class Resample(Command, called="resample", action="logs:resample"):
 
 
 @dataclass(frozen=True)
-class Export(Command, called="export", action="logs:export"):
+class Export(Command, called="export", action="logs:export", group="Look"):
     """Write the logs of a results folder as CSV."""
 
     folder: words.Log
@@ -75,7 +75,7 @@ class Export(Command, called="export", action="logs:export"):
 
 
 @dataclass(frozen=True)
-class ShowDevice(Command, called="device", action="device:device"):
+class ShowDevice(Command, called="device", action="device:device", group="Look"):
     """Print a servo that was identified from public logs, with standard errors, or of a file of BAM; write it for MuJoCo."""
 
     name: Annotated[str, Word("NAME", positional=True)] = ""
@@ -97,7 +97,7 @@ class ShowDevice(Command, called="device", action="device:device"):
 
 
 @dataclass(frozen=True)
-class DescribeRobot(Command, called="robot", action="robot:describe"):
+class DescribeRobot(Command, called="robot", action="robot:describe", group="Look"):
     """Show what is identifiable: joints, base parameters, and a torque budget."""
 
     name: words.ThisRobot
@@ -109,7 +109,7 @@ class DescribeRobot(Command, called="robot", action="robot:describe"):
 
 
 @dataclass(frozen=True)
-class WriteScenario(Command, called="scenario", action="list:write_scenario"):
+class WriteScenario(Command, called="scenario", action="list:write_scenario", group="Extend"):
     """Write a scenario to a file, with every setting explained. Without a name: list the shipped scenarios."""
 
     name: words.ThisScenario = None
@@ -121,7 +121,7 @@ class WriteScenario(Command, called="scenario", action="list:write_scenario"):
 
 
 @dataclass(frozen=True)
-class New(Command, called="new", action="authors:begin"):
+class New(Command, called="new", action="authors:begin", group="Extend"):
     """Create a scenario, a study, a plug-in package (templates that run), or an example arm with logs."""
 
     what: Annotated[Literal["scenario", "study", "plugin", "example"], Word(positional=True)]
@@ -140,7 +140,7 @@ class New(Command, called="new", action="authors:begin"):
 
 
 @dataclass(frozen=True)
-class Check(Command, called="check", action="authors:check"):
+class Check(Command, called="check", action="authors:check", group="Extend"):
     """Check whether a plug-in satisfies the contract of its kind."""
 
     plugin: Annotated[str, Word(positional=True)]
@@ -150,7 +150,7 @@ class Check(Command, called="check", action="authors:check"):
 
 
 @dataclass(frozen=True)
-class Completion(Command, called="completion", action="completion:complete"):
+class Completion(Command, called="completion", action="completion:complete", group="Extend"):
     """Print a script for a shell, which then completes commands and options with the tab key.
 
     bash: idbench completion bash > ~/.local/share/bash-completion/completions/idbench
@@ -167,7 +167,7 @@ class Completion(Command, called="completion", action="completion:complete"):
 
 
 @dataclass(frozen=True)
-class List(Command, called="list", action="list:list_plugins"):
+class List(Command, called="list", action="list:list_plugins", group="Look"):
     """List all parts that can be combined, built-in and plug-ins."""
 
     json: words.Json = False

@@ -17,15 +17,6 @@ NOBODY = "rerun+http://127.0.0.1:{port}/proxy"
 
 
 @pytest.fixture
-def taken():
-    """Give a port that somebody listens at."""
-    with socket.socket() as server:
-        server.bind(("127.0.0.1", 0))
-        server.listen()
-        yield server.getsockname()[1]
-
-
-@pytest.fixture
 def free():
     """Return a port that nobody listens at."""
     with socket.socket() as server:
@@ -40,17 +31,11 @@ def test_a_viewer_that_does_not_answer_is_told_before_anything_is_simulated(comp
     assert "uv run rerun --bind" in printed  # the way out
 
 
-@pytest.mark.parametrize("command", [["run", "ideal"], ["table1"], ["table2"], ["study", "delay"]])
-def test_a_port_that_is_taken_is_told(complaint, tmp_path, monkeypatch, taken, command):
-    monkeypatch.chdir(tmp_path)
-    assert f"port {taken} cannot be used" in complaint(*command, "--serve", "--port", str(taken))
-
-
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems always have a display")
 def test_a_missing_display_is_told(complaint, out, monkeypatch):
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
-    assert "there is no display here: use --serve" in complaint("run", "ideal", "--live", "--out", str(out))
+    assert "there is no display here: `uv run rerun --serve-web" in complaint("run", "ideal", "--live", "--out", str(out))
 
 
 @pytest.mark.parametrize(("pace", "every"), [(None, 1.0), (1.0, 0.1), (5.0, 0.5), (0.2, 0.1), (100.0, 1.0)])

@@ -162,7 +162,7 @@ def test_the_answer_names_the_least_error_of_its_own_table(rng):
     one, other = cell(wild), cell(3 * error, "power")
     assert other.typical < one.typical
     printed = answer([one, other])
-    assert printed.startswith("Least typical error: power and explicit; not significantly different")
+    assert printed.startswith("Least typical error: power and explicit; no significant difference between them")
     assert f"its typical error is {100 * other.typical:.2g} %" in printed
 
 
