@@ -25,19 +25,23 @@ class Conclusion:
     why: str = ""
     """What limits it, in a line of its own."""
 
+    @property
+    def lines(self) -> list[str]:
+        """Its lines, as they are printed."""
+        return [*filter(None, (self.finding, self.why)), f"next: {self.step}"]
+
     def __str__(self) -> str:
-        return f"{'; '.join(filter(None, (self.finding, self.why)))}; next: {self.step}"
+        return "; ".join(self.lines)
 
     def show(self, console: Console) -> None:
         """Print it."""
-        console.print(Text(self.finding, f"bold {COLORS.get(self.word, '')}".strip()), soft_wrap=True)
-        for line in filter(None, (self.why, f"next: {self.step}\n")):
-            console.print(Text(line, "bold"), soft_wrap=True)
+        first, *others = self.lines
+        console.print(Text(first, f"bold {COLORS.get(self.word, '')}".strip()), soft_wrap=True)
+        console.print(Text("\n".join(others) + "\n", "bold"), soft_wrap=True)
 
     def markdown(self, command: str) -> str:
         """The same for a recording, with the command that makes the result again."""
-        lines = f"**{self.finding}**", self.why, f"next: {self.step}", f"`{command}`"
-        return "\n\n".join(filter(None, lines))
+        return "\n\n".join([f"**{self.finding}**", *self.lines[1:], f"`{command}`"])
 
     def summary(self) -> dict[str, str]:
         """Its part of summary.json."""

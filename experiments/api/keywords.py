@@ -4,7 +4,7 @@ import inspect
 import json
 import re
 from collections.abc import Callable, Container
-from functools import partial, reduce
+from functools import reduce
 from typing import Any, TypeVar
 
 from idbench.experiments.requests.jobs import IdentifyRequest
@@ -13,28 +13,20 @@ from idbench.experiments.requests.words import plain_of, request_keys
 Call = TypeVar("Call", bound=Callable[..., Any])
 
 
-def with_keys(request: type, taken: Container[str] = ()) -> Callable[[Call], Call]:
-    """Return what names the keywords of a function in its signature: those of a request but for some that it takes itself."""
-    return partial(_signed, request, taken)
+def with_keys(request: Any, taken: Container[str] = ()) -> Callable[[Call], Call]:
+    """Return what names the keywords of a function in its signature, which help and tab completion read: those of a request."""
 
+    def signed(call: Call) -> Call:
+        own, keyword, nothing = inspect.signature(call), inspect.Parameter.KEYWORD_ONLY, inspect.Parameter.empty
+        every = {name: p for name, p in own.parameters.items() if p.kind is not p.VAR_KEYWORD}
+        for key, (place, hint) in request_keys(request).items():
+            if key not in taken and key not in every:
+                default = reduce(lambda of, name: getattr(of, name, nothing), place, request)
+                every[key] = inspect.Parameter(key, keyword, default=default, annotation=plain_of(hint))
+        call.__signature__ = own.replace(parameters=[*every.values()])  # type: ignore[attr-defined]
+        return call
 
-def _signed(request: Any, taken: Container[str], call: Call) -> Call:
-    own = inspect.signature(call)
-    given = {name: p for name, p in own.parameters.items() if p.kind is not p.VAR_KEYWORD}
-    more = {
-        key: inspect.Parameter(
-            key, inspect.Parameter.KEYWORD_ONLY, default=reduce(_default, place, request), annotation=plain_of(hint)
-        )
-        for key, (place, hint) in request_keys(request).items()
-        if key not in taken
-    }
-    every = given | {key: parameter for key, parameter in more.items() if key not in given}
-    call.__signature__ = own.replace(parameters=[*every.values()])  # type: ignore[attr-defined]  # for help and tab completion
-    return call
-
-
-def _default(of: object, name: str) -> Any:
-    return getattr(of, name, inspect.Parameter.empty)
+    return signed
 
 
 WORDS = "estimate|joints|auto|smooth|standard|none|all|held|instantaneous|averaged"  # Values that are words of sentences, too
@@ -48,7 +40,10 @@ def in_python(text: str) -> str:
     keys = request_keys(IdentifyRequest)
 
     def keyword(found: re.Match[str]) -> str:
-        key, values = found[1].replace("-", "_"), [_value(word) for word in found[2].split()]
+        key, values = (
+            found[1].replace("-", "_"),
+            [word if NUMBER.fullmatch(word) else json.dumps(word) for word in found[2].split()],
+        )
         if key == "write":
             return f"fit.write({', '.join(values)})"
         if key not in keys:
@@ -58,7 +53,3 @@ def in_python(text: str) -> str:
         return f"{key}={values[0] if len(values) == 1 else '[' + ', '.join(values) + ']'}"
 
     return BETWEEN.sub(", ", OPTION.sub(keyword, text.replace("idbench excite", "idbench.design")))
-
-
-def _value(word: str) -> str:
-    return word if NUMBER.fullmatch(word) else json.dumps(word)

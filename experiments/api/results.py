@@ -271,7 +271,8 @@ class Identification:
         return self.fit.estimates[name]
 
     def __repr__(self) -> str:
-        return f"{self.verdict}\n\n{text_table(*self._table())}"
+        lines = in_python("\n".join(self.answer.lines))
+        return f"{lines}\n\n{text_table(*self._table())}"
 
     def _repr_html_(self) -> str:
         return html_table(self.verdict, *self._table()[1:])

@@ -213,18 +213,19 @@ def _agree(found: Row) -> str:
 def errors_figure(sets: Sequence[tuple[str, Mapping[str, Sequence[float]]]]) -> Figure:
     """Return torque errors of every joint [% of its torque], by set and tool: a line a set, a colour a tool."""
     tools = list(dict.fromkeys(tool for _, each in sets for tool in each))
-    figure = Figure(figsize=(8, 1.2 + 0.5 * len(sets)), layout="constrained")
+    figure = Figure(figsize=(8, 1.2 + 0.8 * len(sets)), layout="constrained")
     panel = figure.subplots()
     for k, tool in enumerate(tools):
         height = 0.6 * ((k + 0.5) / len(tools) - 0.5)
-        places = [(share, y + height) for y, (_, each) in enumerate(sets) for share in each.get(tool, ())]
-        x, y = np.array(places).reshape(-1, 2).T
         color = [c / 255 for c in JOINTS[k % len(JOINTS)]]
-        panel.plot(x, y, ".", color=color, label=tool, markersize=7)
+        panel.plot([], [], "s", color=color, label=tool)
+        for y, (_, each) in enumerate(sets):
+            for j, share in enumerate(each.get(tool, ())):
+                panel.plot(share, y + height, marker=f"${j + 1}$", color=color, markersize=6.5, markeredgewidth=0.4)
     panel.set_yticks(range(len(sets)), [title for title, _ in sets], parse_math=False)
     panel.invert_yaxis()
     panel.set_xscale("log")
     panel.xaxis.set_major_formatter("{x:g}")
-    panel.set_xlabel("torque error on held-out logs [% of the joint's torque]; a dot is a joint, further left is better")
+    panel.set_xlabel("held-out torque error [% of the torque]; numbers are joints, left is better")
     figure.legend(loc="outside upper right", ncols=5, frameon=False)
     return figure
