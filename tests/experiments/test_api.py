@@ -1,5 +1,6 @@
 """`import idbench`: a call gives what its command writes; results say what they are; wrong keys are refused by name."""
 
+import inspect
 import json
 import subprocess
 import sys
@@ -9,8 +10,11 @@ import numpy as np
 import pytest
 
 import idbench
+from idbench.experiments.api.keywords import in_python
 from idbench.identify import ESTIMATORS, AbstractEstimator, AbstractFriction, Estimate, WeightedLeastSquares
 from idbench.identify.files.log_file import write_log
+from idbench.sim.controllers import AbstractController, AbstractLaw, Error, PDFeedforward
+from idbench.sim.settings import Positive, settings
 from idbench.sim.trajectories import RandomMoves
 
 
@@ -249,6 +253,13 @@ def test_an_object_has_the_name_of_the_table_where_it_is_one():
         (lambda log, found: idbench.load_scenario(3), "is no scenario"),
         (lambda log, found: idbench.simulate(3), "give its name"),
         (lambda log, found: idbench.fit(log, no_trials="yes"), "must be true or false"),
+        (lambda log, found: idbench.fit(log, model={}), "must be"),
+        (lambda log, found: idbench.read_log("a.csv", torque="held", robot=2.5), "give its name"),
+        (lambda log, found: idbench.study("encoder", seeds=2, threads="two"), "valid integer"),
+        (lambda log, found: idbench.study("encoder", seeds=2, out=3), "give its name"),
+        (lambda log, found: idbench.study(idbench.load_scenario("ideal"), axes=[1]), "mapping of settings"),
+        (lambda log, found: found.predict([0, 0], [0, 0], [0, 0], model=[None]), "no estimate of"),
+        (lambda log, found: idbench.TorqueChannel(np.zeros(3)), "is unknown"),
     ],
 )
 def test_wrong_types_are_told_in_one_line(files, call, complaint):
@@ -276,3 +287,66 @@ def test_it_lives_beside_folders_of_the_same_names(tmp_path):
     (tmp_path / "script.py").write_text(code)
     done = subprocess.run([sys.executable, "script.py"], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.stdout == "my models my sim my identify my experiments 8\n", done.stderr
+
+
+@pytest.mark.parametrize(
+    ("option", "keyword"),
+    [
+        ("--friction standard 1=standard+cogging:36", 'friction=["standard", "1=standard+cogging:36"]'),
+        ("--gain 1 1 0.9109 --torque-delay estimate", 'gain=[1, 1, 0.9109], torque_delay="estimate"'),
+        ("--gain 1 1.15 or --gain 0.8697 1", "gain=[1, 1.15] or gain=[0.8697, 1]"),
+        ("--write arm.urdf arm.py keeps the robot", 'fit.write("arm.urdf", "arm.py") keeps the robot'),
+        ("for a simulation add --simulated", "for a simulation add simulated=True"),
+        ("motion (idbench excite), or friction (--friction auto)", 'motion (idbench.design), or friction (friction="auto")'),
+        ("--robot FILE names another", 'robot="FILE" names another'),
+    ],
+)
+def test_the_next_step_is_in_keywords(option, keyword):
+    assert in_python(option) == keyword
+
+
+@pytest.mark.parametrize("call", [idbench.fit, idbench.load_robot, idbench.read_log, idbench.fit_servos, idbench.design])
+def test_help_names_every_keyword(call):
+    parameters = inspect.signature(call).parameters.values()
+    assert len(parameters) > 8
+    assert not [p for p in parameters if p.kind is p.VAR_KEYWORD]
+
+
+@settings
+class Stiff(AbstractController):
+    """u = tau_nominal(q_ref) + M (w^2 e + 2 w de/dt)."""
+
+    bandwidth: Positive = 20.0
+
+    def start(self, task):
+        return StiffLaw(task, self.bandwidth)
+
+
+class StiffLaw(AbstractLaw):
+    def __init__(self, task, w):
+        self.ahead, self.kp, self.kd = task.feedforward, task.inertia * w**2, task.inertia * 2 * w
+        self.error = Error(task.reference, task.nsim, 100.0)
+
+    def command(self, k, q):
+        e, rate = self.error.update(k, q)
+        return self.ahead[k] + self.kp * e + self.kd * rate
+
+
+def test_a_study_of_a_scenario_takes_a_controller_of_ones_own():
+    """It is the built-in one with the same settings: so are its errors."""
+    scenario = replace(idbench.load_scenario("quantization"), trajectory=RandomMoves(moves=5))
+    asked = {"seeds": 2, "axes": {"controller.bandwidth": [10.0, 20.0]}, "models": ["explicit"], "estimators": ["OLS"]}
+    own = idbench.study(replace(scenario, controller=Stiff()), **asked)
+    built_in = idbench.study(replace(scenario, controller=PDFeedforward(20.0)), **asked)
+    assert [cell.settings["controller.bandwidth"] for cell in own.cells] == [10.0, 20.0]
+    for mine, theirs in zip(own.cells, built_in.cells, strict=True):
+        np.testing.assert_allclose(mine.X, theirs.X, rtol=1e-6)
+    assert repr(own).startswith("Result: ")
+
+
+def test_the_truth_of_an_added_law_may_be_missing():
+    run = idbench.simulate("ideal")
+    fit = idbench.fit(run.log, run.robot, add="offset", truth=run.truth, model="explicit", estimator="OLS")
+    assert (fit.parameters["off1"].truth, fit.parameters["Fs1"].truth) == (0.0, 0.5)
+    with pytest.raises(idbench.ExperimentError, match="truth: Fs1 is missing"):
+        idbench.fit(run.log, run.robot, truth={k: x for k, x in run.truth.items() if k != "Fs1"})

@@ -9,12 +9,13 @@ import pytest
 
 from idbench.experiments.cli import main
 from idbench.experiments.cli.app import COMMANDS
+from idbench.experiments.cli.command import GROUPS
 from idbench.experiments.paper.table1 import SCENARIO
 from idbench.experiments.plugin_tables import TABLES
 from idbench.experiments.requests.shared import CHAIN, ESTIMATOR
 from idbench.experiments.results.writing import NAME as MANIFEST
 from idbench.identify import CHAINS, ESTIMATORS, MODELS, identify, scara
-from idbench.identify.files.log_file import read_log
+from idbench.identify.files.log_file import read_log, write_log
 from idbench.sim.scenario.scenario_file import from_dict, load
 
 
@@ -108,12 +109,30 @@ def test_bash_completes_what_is_typed(tmp_path, capsys):
     assert main(["completion", "bash"]) == 0
     (tmp_path / "idbench.bash").write_text(capsys.readouterr().out)
     code = """source idbench.bash; f=$(complete -p idbench | sed 's/.*-F \\([^ ]*\\).*/\\1/')
-    for words in "idbench ident" "idbench identify --torque-d" "idbench identify --arma" "idbench identify idb"; do
+    for words in "idbench ident" "idbench identify --torque-d" "idbench identify --arma" "idbench identify idb" \\
+        "idbench run rip" "idbench study smallest-d" "idbench identify --estimator GL" "idbench run ripple --robot pum"; do
         COMP_WORDS=($words); COMP_CWORD=$((${#COMP_WORDS[@]} - 1)); COMP_LINE=$words; COMP_POINT=${#words}
         $f; echo "${#COMPREPLY[@]} ${COMPREPLY[@]}"
     done"""
     done = subprocess.run(["bash", "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True)
-    assert done.stdout.split() == ["1", "identify", "1", "--torque-delay", "1", "--armature", "1", "idbench.bash"]
+    words = ["identify", "--torque-delay", "--armature", "idbench.bash", "ripple", "smallest-delay", "GLS", "puma560"]
+    assert done.stdout.split() == [word for each in words for word in ("1", each)]
+
+
+def test_the_commands_are_in_groups(capsys):
+    assert main(["--help"]) == 0
+    titles = re.findall(r"─ (\w+) ─", capsys.readouterr().out)
+    assert titles == [*GROUPS, "Help"]
+    assert {command.group for command in COMMANDS.values()} == set(GROUPS)
+
+
+def test_a_command_that_is_repeated_says_what_changed(log, tmp_path, ran):
+    write_log(log.part(0, 2000), tmp_path / "a.csv")
+    words = "identify a.csv --robot scara --torque held --model explicit --estimator OLS --no-rerun --out found"
+    assert "changed since" not in ran(words, "--torque-delay 0").out
+    assert "changed since" not in ran(words, "--torque-delay 0").out  # the same bits
+    again = ran(words, "--torque-delay 0.001 --force").out
+    assert re.search(r"changed since the last results there: \w+ of the explicit model from \S+ to \S+ .* \(\S+ sigma\)", again)
 
 
 def test_the_command_lines_defaults_are_those_of_python(log):
