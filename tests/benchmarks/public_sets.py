@@ -13,6 +13,7 @@ import time
 import tomllib
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, replace
+from importlib.metadata import version
 from itertools import combinations
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
@@ -23,6 +24,7 @@ from rich.console import Console
 from set_tables import print_rows
 from set_tools import judged, predictions, what_tools_read, write_for_tools
 
+from idbench.experiments.document import Conclusion
 from idbench.experiments.errors import ExperimentError, is_told, reason, report
 from idbench.experiments.exports.exports import EXPORTS
 from idbench.experiments.identification.fit import Fit
@@ -37,7 +39,7 @@ from idbench.experiments.judgement.judgement import Unjudged, judge
 from idbench.experiments.requests.jobs import IdentifyRequest, ServoRequest
 from idbench.experiments.requests.table import request_from
 from idbench.experiments.requests.words import request_keys, word_of
-from idbench.experiments.results.writing import finite, write_summary
+from idbench.experiments.results.writing import finite
 from idbench.experiments.servo.identification import Servos, summary_of
 from idbench.experiments.servo.job import servos_identified
 from idbench.experiments.text import SIGMAS
@@ -387,8 +389,13 @@ def main() -> int:
             failed[name] = reason(error) if is_told(error) else f"{reason(error)}; its traceback is in {report(error)}"
             continue
         rows.append({"set": name, **json.loads(json.dumps(row))})
-        write_summary(out / "summary.json", rows[-1])
+        content = {"version": version("idbench"), **rows[-1]}
+        (out / "summary.json").write_text(json.dumps(content, indent=2, allow_nan=False) + "\n", encoding="utf-8")
     if rows:
+        off = [float(np.median(each)) for row in rows if (each := row.get("percent", {}).get("idbench"))]
+        span = f", torques of the median joint within {min(off):.2g} to {max(off):.2g} %" if off else ""
+        finding = f"Result: {len(rows)} set{'s' * (len(rows) > 1)}{span}"
+        Conclusion("", finding, f"summaries are in {asked.out}").show(Console())
         print_rows(Console(), rows)
     for name, why in failed.items():
         print(f"{name}: {why}", file=sys.stderr)
