@@ -73,7 +73,6 @@ PICTURES = {
     "delay": Movie(DELAY, "", 0.3, until=0.42),
     "recording-overview": Picture(("run quantization --out OUT",)),
     "recording-filters": Picture(("run quantization --out OUT",), "filters"),
-    "recording-excitation": Picture(("run quantization --out OUT",), "excitation"),
     "recording-delay": Picture(DELAY),
     "recording-delay-friction": Picture(DELAY, "friction"),
     "recording-cogging": Picture(COGGING, "friction"),
@@ -86,7 +85,6 @@ PICTURES = {
     "recording-compare": Picture(("run quantization --out OUT/quantization", "run ripple --out OUT/ripple"), "compare"),
     "recording-excited": Picture(("excite panda --out OUT --force",), "", 0.55),
     "recording-servo": Picture(SERVO),
-    "recording-servo-backlash": Picture(("run servo-backlash --out OUT",), "drive"),
     "recording-study": Picture(("study encoder --out OUT",), "study"),
 }
 

@@ -213,7 +213,7 @@ def _send_sigmas(stream: Stream, cells: Sequence[Cell]) -> None:
         shares[model] = counts / max(counts.sum(), 1)
     x, y = linear("error over its sigma", EDGES), linear("share of all errors", np.zeros(1), normal, *shares.values())
     chart = Chart(stream, "study/sigmas", x, y)
-    chart.line("as it should be", middle, normal, GREY, 3.0)
+    chart.line("normal", middle, normal, GREY, 3.0)
     for model, share in shares.items():
         chart.line(model, middle, share, FORMS.get(model, GREY))
 
