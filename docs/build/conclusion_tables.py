@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from results import DOCS, RESULTS, cells, table, typical
+from results import DOCS, RESULTS, table
 
 from idbench.experiments.study.ratios import PAIRS, interval
 
@@ -72,27 +72,6 @@ def _many_joints() -> Iterator[str]:
         yield from _of_models(study, ("idbench",), robot)
 
 
-def _windows() -> Iterator[str]:
-    """Yield typical errors of the energy model: of the torque's noise alone, with an offset, and of chosen windows."""
-    found = {
-        (c["settings"]["chain.operator"], c["settings"]["torque"], c["estimator"]): c
-        for c in cells("windows")
-        if c["model"] == "energy"
-    }
-    labels = list(dict.fromkeys(key[0] for key in found))
-    cases = (("noise", "OLS"), ("offset", "OLS"), ("noise", "OLS-selected"), ("offset", "OLS-selected"))
-    rows = ([label.removeprefix("windows, "), *(typical(found[label, *case]) for case in cases)] for label in labels)
-    yield from table(["windows [s]", "noise", "noise, offset", "selected, noise", "selected, noise, offset"], rows)
-
-
-def _quality() -> Iterator[str]:
-    """Yield typical errors over the number of moves."""
-    found = {(c["settings"]["trajectory.moves"], c["chain"], c["model"]): c for c in cells("quality")}
-    moves, ways = (list(dict.fromkeys(key[part] for key in found)) for part in (slice(0, 1), slice(1, 3)))
-    rows = ([f"{m:g}", *(typical(found[m, *way]) for way in ways)] for (m,) in moves)
-    yield from table(["moves", *(f"{model}, {chain}" for chain, model in ways)], rows)
-
-
 def _operations() -> Iterator[str]:
     from idbench.experiments.identification.robot_model import RobotModel
     from idbench.identify.basis.operations import COLUMNS, operations
@@ -110,8 +89,6 @@ def _operations() -> Iterator[str]:
 CONCLUSION_TABLES: dict[str, Callable[[], Iterator[str]]] = {
     "models": lambda: _of_models("models", ("idbench", "paper")),
     "models-joints": _many_joints,
-    "windows": _windows,
-    "quality": _quality,
     "operations": _operations,
 }
 

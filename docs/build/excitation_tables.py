@@ -2,7 +2,6 @@
 
 import json
 from collections.abc import Iterator, Sequence
-from math import exp, log
 
 from results import RESULTS, Cell, cells, table, typical
 
@@ -42,28 +41,3 @@ def criteria() -> Iterator[str]:
 
     heads = [f"{arm}: {what}" for arm in ARMS for what in ("Cond(W)", "predicted", "found")]
     yield from table(["what is optimised", *heads], rows())
-
-
-def foretold() -> Iterator[str]:
-    """Yield errors over what was predicted of them."""
-    motions = json.loads((RESULTS / "excitation-motions.json").read_text())
-    bits = {0.0: ("24", "none"), 1.384e-05: ("17", "17 bits"), 1.107e-04: ("14", "14 bits")}
-
-    def rows() -> Iterator[Sequence[str]]:
-        for level, (number, words) in bits.items():
-            row = [words]
-            for arm, end in (("scara", ""), ("puma560", "-puma")):
-                study = cells(f"excitation-predicted{end}")
-                each = {c["estimator"]: c for c in study if c["settings"]["encoder.noise"] == level}
-                predicted = motions[f"{arm}-sigma"]["sigma_percent"][number]
-                row += [f"{_ratio(each[method], predicted):.2f}" for method in ("GLS", "ML")]
-            yield row
-
-    heads = [f"{arm}, {method}" for arm in ("scara", "puma560") for method in ("GLS", "ML")]
-    yield from table(["noise of the positions", *heads], rows())
-
-
-def _ratio(cell: Cell, predicted: Sequence[float | None]) -> float:
-    """Return the geometric mean of errors over what was predicted."""
-    pairs = [(e, p) for e, p in zip(cell["rmse_percent"], predicted, strict=True) if e and p]
-    return exp(sum(log(e / p) for e, p in pairs) / len(pairs))

@@ -34,13 +34,13 @@ SCENARIOS = {
     "quantization": ("overview", "Coarse encoders: residuals are rough wherever a joint moves."),
     "ripple": ("friction", "Cogging: residuals over the position are a wave, once per slot."),
     "saturation": ("overview", "Pink: the drive is at its limit, and the logged torque is not the one that acted."),
-    "delay": ("overview", "A late torque: residuals have the shape of the torque's slope."),
+    "delay": ("overview", "Nothing late is left: the log states its delay. Without it: the first hour."),
     "gain": (
         "overview",
         "The torque constant of joint 1 is 15 % off: of two joints only their ratio shows, in joint 2.",
     ),
     "stribeck": ("friction", "Friction near standstill: over the velocity a peak beside zero, which the law lacks."),
-    "payload": ("overview", "A payload: the residuals repeat the torque of gravity and inertia."),
+    "payload": ("overview", "Nothing: a constant payload becomes part of the parameters (ZZ2 0.142 instead of 0.06)."),
     "ruckig": (
         "overview",
         "Jerk-limited moves: velocities rise and fall in straight lines, with little time near rest.",
@@ -128,11 +128,11 @@ def photographed(name: str, client: object) -> None:
 def page() -> str:
     """Return what goes into the page."""
     study = tomllib.loads(STUDY.read_text())["settings"]
-    fault = tomli_w.dumps({**study, "fault": [{"kind": "offset", "joint": "elbow", "size": 0.33}]})
+    fault = tomli_w.dumps({"name": "fault", **study, "fault": [{"kind": "offset", "joint": "elbow", "size": 0.33}]})
     return "\n".join(
         [
-            "Each picture is the recording of a run, each quotation what `run` prints (nothing, if it has none at this size).",
-            "Scenarios: `uv run idbench run NAME`.\n",
+            "Each picture is the recording of a run, each quotation what `run` prints: without one, the cause is not named at this ",
+            "size; where another is named, that is wrong. Scenarios: `uv run idbench run NAME`.\n",
             *(_figure(name, see, name) for name, (_, see) in SCENARIOS.items()),
             "Faults of two links, with their sizes: the lines below are `fault.toml`; `uv run idbench run fault.toml`.",
             f"From which size on each is named: [a study](benchmark.md#what-is-wrong).\n\n```toml\n{fault}```\n",
@@ -143,7 +143,8 @@ def page() -> str:
 
 def _named(case: dict[str, object]) -> str:
     (fault,) = case["fault"]  # type: ignore[misc]
-    return f"{fault['kind']}, {fault['size']:g}"  # type: ignore[index]
+    when = [f"{key} {fault[key]:g}" for key in ("start", "end") if key in fault]  # type: ignore[index, operator]
+    return ", ".join([f"{fault['kind']}, {fault['size']:g}", *when])  # type: ignore[index]
 
 
 def _figure(name: str, see: str, title: str) -> str:

@@ -19,7 +19,7 @@ from benchmark_tables import BENCHMARK_TABLES
 from conclusion_sentences import sentences
 from conclusion_tables import CONCLUSION_TABLES, keep_conclusion
 from estimator_tables import compared, compared_in_birdys_shape
-from excitation_tables import criteria, foretold
+from excitation_tables import criteria
 from fault_tables import cogging
 from results import DOCS, RESULTS, Cell, Column, by_settings, cells, coverage, keep, table, typical
 from reversal_tables import reversals
@@ -134,7 +134,6 @@ TABLES: dict[str, Callable[[], Iterator[str]]] = {
     "bound-encoder": _bound("bound-encoder", "lines (counts)", _lines),
     "reversals": reversals,
     "excitation-criteria": criteria,
-    "excitation-predicted": foretold,
     "estimators-idbench": compared("idbench"),
     "estimators-unfiltered": compared("unfiltered"),
     "estimators-puma560": compared_in_birdys_shape,
