@@ -257,7 +257,6 @@ CLAIMS: list[tuple[str, str, Callable[[], object]]] = [
     ("answers.md", r"SCARA, logged at (\d+) Hz", lambda: load("ideal").fs),
     ("answers.md", r"moves of [\d.]+ s; (\d+) runs per row", lambda: load_study("encoder").seeds),
     ("answers.md", r"\(12 moves; (\d+) runs per row", lambda: load_study("sigma").seeds),
-    ("answers.md", r"N m; (\d+) runs\) <!-- table: sample-rate", lambda: load_study("sample-rate").seeds),
     ("answers.md", r"N m; (\d+) runs\) <!-- table: ripple", lambda: load_study("ripple").seeds),
     ("answers.md", r"0\.1 N m gives ([\d.]+) %", lambda: rounded(typical("torque-noise", "explicit", 0.1))),
     ("answers.md", r"torque noise, (\d+) to \d+ times with encoder noise", lambda: round(min(power_of_encoders()))),

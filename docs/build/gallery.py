@@ -131,8 +131,8 @@ def page() -> str:
     fault = tomli_w.dumps({"name": "fault", **study, "fault": [{"kind": "offset", "joint": "elbow", "size": 0.33}]})
     return "\n".join(
         [
-            "Each picture is the recording of a run, each quotation what `run` prints: without one, the cause is not named at this ",
-            "size; where another is named, that is wrong. Scenarios: `uv run idbench run NAME`.\n",
+            "Each picture is the recording of a run, each quotation what `run` prints: without one, the cause is not named at",
+            "this size; where another is named, that is wrong. Scenarios: `uv run idbench run NAME`.\n",
             *(_figure(name, see, name) for name, (_, see) in SCENARIOS.items()),
             "Faults of two links, with their sizes: the lines below are `fault.toml`; `uv run idbench run fault.toml`.",
             f"From which size on each is named: [a study](benchmark.md#what-is-wrong).\n\n```toml\n{fault}```\n",

@@ -126,7 +126,6 @@ TABLES: dict[str, Callable[[], Iterator[str]]] = {
     "zoo": _zoo,
     "encoder": lambda: _usual("encoder", "lines (counts)", _lines, FOUR),
     "torque-noise": lambda: _usual("torque-noise", "rms [N m]", _one("torque.noise"), FOUR),
-    "sample-rate": lambda: _usual("sample-rate", "fs [Hz]", _one("fs"), TWO),
     "ripple": lambda: _usual("ripple", "cogging", _one("ripple.cogging"), TWO),
     "delay": lambda: _usual("delay", "delay [ms]", _one("timing.delay", 1e3), FOUR),
     "sigma": _sigma,
