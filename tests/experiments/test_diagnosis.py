@@ -31,7 +31,7 @@ def test_a_wrong_torque_constant_is_named_and_the_option_mends_it(ran, tmp_path)
     scaled(tmp_path / "demo/log.csv", tmp_path / "bad.csv", "tau3", 1.1)
     out, err, summary = ran("identify bad.csv", how, "--out bad")
     assert out.startswith("Result: fair")
-    assert "joint3: torque constant" in out.splitlines()[0]
+    assert "joint3: torque constant" in out.splitlines()[1]
     first = summary["diagnosis"][0]
     assert (first["cause"], first["joint"], first["unit"]) == ("gain", "joint3", "1")
     assert abs(first["size"] - 0.1) < 4 * first["sigma"] + 0.01

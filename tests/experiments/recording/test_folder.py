@@ -80,7 +80,7 @@ def test_one_file_holds_everything(copied, reading):
 
 @pytest.mark.thorough
 def test_what_is_wrong_is_told(copied, tmp_path, complaint):
-    assert "no tab 'frictoin'; it has overview, friction, drive, filters, noise, excitation, parameters" in complaint(
+    assert "no tab 'frictoin'; it has result, overview, friction, drive, filters, noise, excitation, parameters" in complaint(
         "view", str(copied), "--tab", "frictoin", "--save", str(tmp_path / "x.rrd")
     )
     assert "must end with .rrd" in complaint("view", str(copied), "--save", str(tmp_path / "x.png"))
