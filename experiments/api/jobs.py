@@ -98,7 +98,7 @@ def study(
     ----------
     name : str, Path, Study or Scenario
         Name of a shipped study (`idbench study` lists them), its file (TOML), the study itself, or a scenario, whose parts may
-        be of classes of your own.
+        be of classes of your own; its motion is drawn anew in each run if its trajectory is random, else all runs share it.
     axes : mapping of str to sequence, optional
         Values of the settings of a scenario that vary, such as {"encoder.lines": [1024, 4096]}.
     seeds : int, optional
@@ -132,8 +132,9 @@ def study(
         raise ExperimentError(f"study: axes = {axes!r:.60}: give a mapping of settings to values")
     if isinstance(name, Scenario):
         each = [{"field": field, "values": list(several(values))} for field, values in (axes or {"fs": [name.fs]}).items()]
-        question = f"How accurate is the identification of {name.name}?"
-        described = study_from({"name": name.name, "question": question, "scenario": to_dict(name), "axes": each}, "study")
+        motion = "drawn" if hasattr(name.trajectory, "seed") else "shared"
+        head = {"name": name.name, "question": f"How accurate is the identification of {name.name}?", "motion": motion}
+        described = study_from({**head, "scenario": to_dict(name), "axes": each}, "study")
     elif axes is not None:
         raise ExperimentError("study: axes are of a scenario; a study has its own")
     else:

@@ -35,7 +35,7 @@ MODULES = {
     "new scenario mine": (1035, set()),
     "check --help": (330, set()),
     "view --help": (330, set()),
-    "completion bash": (340, set()),
+    "completion bash": (965, set()),
     "resample ex/log.csv --torque held --out even.csv": (965, set()),
     "run ideal --no-rerun": (1100, set()),
     f"{IDENTIFY} --no-rerun": (1090, set()),

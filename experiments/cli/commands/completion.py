@@ -16,10 +16,9 @@ from idbench.sim.scenario.scenario_file import names as scenarios
 
 def complete(options: Completion) -> None:
     """Print the script; bash names files where there are no words."""
-    every: dict[str, list[str] | tuple[str, ...]] = {"loop": scenarios(), "like": scenarios(), "scenario": scenarios()}
-    every |= {"study": studies(), "robot": models.names(), "model": [*MODELS, "all"], "chain": [*CHAINS]}
-    laws = [AUTO, SMOOTH, *GROUPS, *BLOCKS]
-    names = every | {"estimator": [*ESTIMATORS], "friction": laws, "add": [*BLOCKS]}
+    names = {key: [*scenarios()] for key in ("loop", "like", "scenario")} | {"study": [*studies()], "robot": [*models.names()]}
+    names |= {"model": [*MODELS, "all"], "chain": [*CHAINS], "estimator": [*ESTIMATORS], "add": [*BLOCKS]}
+    names["friction"] = [AUTO, SMOOTH, *GROUPS, *BLOCKS]
     page, script = Page(), every_command(COMMANDS, DESCRIPTION, names).generate_completion(shell=options.shell)
     page.print(Text(script.replace("complete -F ", "complete -o default -F ")), soft_wrap=True)
     page.close()

@@ -100,7 +100,7 @@ def test_the_arm_moves_in_the_viewer_before_the_run_has_ended(viewer, tmp_path, 
 def picture(client):
     """Return how the arm is drawn; views get other names with each new layout, of which one may come in between."""
     for _ in range(10):
-        (arm,) = [view for view in client.get_state().views if view.name == "arm"]
+        arm = next(view for view in client.get_state().views if view.name == "arm")
         with suppress(ConnectionError):
             return client.take_screenshot(arm.view_id)
     return pytest.fail("the arm is not drawn")
