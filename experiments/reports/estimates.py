@@ -100,16 +100,11 @@ def _explained(share: float) -> str:
 LEAST = 0.01  # Difference in sigma that means nothing
 
 
-def models_in_full(fit: Fit, asked: bool) -> tuple[str, ...]:
-    """Return the models whose tables are shown whole: all if they were asked for, else the first."""
-    return tuple(fit.estimates) if asked else tuple(fit.estimates)[:1]
-
-
 def differing(fit: Fit, whole: Sequence[str]) -> Iterator[str]:
     """Yield a line on how far the models are from the leading one that are not shown whole."""
     if far := {model: _sigmas_apart(fit, model, whole[0]) for model in fit.estimates if model not in whole}:
         each = ", ".join(f"{model} by {_far(x)} sigma" for model, x in far.items())
-        yield f"other models differ: {each} (--model all shows them)"
+        yield f"other models differ: {each} (identify --model all shows them)"
 
 
 def _far(sigmas: float) -> str:

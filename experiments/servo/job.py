@@ -47,6 +47,8 @@ class ServosFit:
     """The laws of friction that were compared, of joints that have a fit."""
     mistakes: Mapping[str, Suspect] = field(default_factory=dict)
     """What is wrong with joints, and was proved."""
+    written: Sequence[Path] = ()
+    """Files that will be written."""
 
     @property
     def fits(self) -> dict[str, ServoFit]:
@@ -71,7 +73,8 @@ class ServosFit:
         remedies = [remedy_of(mistake) for mistake in self.mistakes.values()]
         doubts = [line for lines in self.warnings.values() for line in lines]
         word, finding = self.verdicts[0]
-        kept = ["--write robot.xml servo.py keeps the servos"] if word == "good" else doubts
+        keep = f"use {', '.join(map(str, self.written))}" if self.written else "--write robot.xml servo.py keeps the servos"
+        kept = [keep] if word == "good" else doubts
         return Conclusion(word, finding, [*remedies, *kept, "log another motion, and name it with --validate"][0])
 
     @property

@@ -69,10 +69,11 @@ def headline(cells: Sequence[Cell], edges: int = 4) -> str:
     best = [_best(group) for group in groups]
     if asked := requirements(best, edges):
         return asked
-    low, high = (percent(pick(cell.typical for cell in best)) for pick in (min, max))
+    (winner, count), *_ = Counter(method(cell, solved) for cell in best).most_common(1)
+    low, high = (percent(pick(c.typical for c in solved if method(c, solved) == winner)) for pick in (min, max))
     errors = f"typical error {low}" if len(best) == 1 else f"typical errors {low} to {high}"
-    counts = Counter(method(cell, solved) for cell in best)
-    return errors if len(solved) == len(groups) else f"least with {counts.most_common(1)[0][0]}: {errors}"
+    share = f" in {count} of {len(best)} settings" if count < len(best) else ""
+    return errors if len(solved) == len(groups) else f"least with {winner}{share}: {errors}"
 
 
 def _asked(cells: Sequence[Cell], edges: int) -> str:

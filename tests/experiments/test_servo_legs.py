@@ -50,7 +50,7 @@ def test_the_file_of_a_leg_is_as_good_as_its_fit(idbench, tmp_path, monkeypatch)
     assert code == 0, err
     result, step, *_ = out.splitlines()
     assert result.startswith("Result: good (")
-    assert step == "next: --write robot.xml servo.py keeps the servos"
+    assert step == "next: use w.xml"
     found = json.loads((tmp_path / "out" / "summary.json").read_text())
     delays = [found["joints"][joint]["delay"]["value"] for joint in JOINTS]
     np.testing.assert_allclose(delays, DELAY, atol=5e-4)  # a step of the written file

@@ -19,7 +19,6 @@ from idbench.experiments.inputs import files_of
 from idbench.experiments.judgement.judgement import Judgement, conclusion, judge
 from idbench.experiments.judgement.remedies import checks
 from idbench.experiments.note import noted
-from idbench.experiments.reports.estimates import models_in_full
 from idbench.experiments.reports.printed import print_fit, print_held_out
 from idbench.experiments.results.attempts import Attempts
 from idbench.experiments.results.folder import ResultsFolder
@@ -38,7 +37,7 @@ def identify(options: Identify) -> None:
     with closing(page), folder.held() if folder else nullcontext(), options.watching.audience() as audience:
         with stages_of("identifying"):
             result = fit_of(*loaded_logs(with_own_parts(options), request))
-        whole_models = models_in_full(result, options.model is not None)
+        whole_models = tuple(result.estimates)[: 1 if options.model is None else None]
         page.found |= {"experiment": "identify", "log": log.name, "path": str(log), **summary_of(result)}
         kept = f"the estimates are printed{f', and with the logs in {folder.out}' if folder else ''}"
         with Attempts(kept, folder) as attempts:

@@ -18,7 +18,6 @@ from idbench.experiments.identification.scenario_run import ScenarioRun
 from idbench.experiments.judgement.warnings import FILE, LOG, MODEL, warnings_of_robot
 from idbench.experiments.plugin_tables import plugin_conflicts
 from idbench.experiments.program import program
-from idbench.experiments.reports.estimates import models_in_full
 from idbench.experiments.reports.printed import print_fit
 from idbench.experiments.results.page import Page, stages_of
 from idbench.experiments.study.one_run import run_of
@@ -76,7 +75,7 @@ def _as_servos(scenario: Scenario, out: Path) -> str:
 
 def _print_run(page: Page, ran: ScenarioRun, *, verbose: bool) -> None:
     """Print the estimates, of the paper's robot those of all models, and what to check."""
-    whole = models_in_full(ran.fit, asked=ran.scenario.robot == SCARA)
+    whole = tuple(ran.fit.estimates)[: None if ran.scenario.robot == SCARA else 1]
     print_fit(page, ran.fit, f"Scenario {ran.scenario.name}", whole, verbose=verbose)
     if ran.rejection is not None:
         page.print(Text(ran.rejection.words(ran.run.robots[0].joints, ran.scenario.wdyn)), soft_wrap=True)

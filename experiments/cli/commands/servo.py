@@ -1,6 +1,7 @@
 """The command that identifies servos."""
 
 from contextlib import closing, nullcontext
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -66,7 +67,7 @@ def _identified(page: Page, folder: ResultsFolder | None, options: IdentifyServo
 
     try:
         with stages_of("identifying"):
-            made = servos_identified(options, heard)
+            made = replace(servos_identified(options, heard), written=tuple(options.write))
         page.found |= made.summary()
         return made, made.document()
     except BaseException:
