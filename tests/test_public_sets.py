@@ -95,7 +95,7 @@ def test_a_set_becomes_a_row_beside_published_figures(arm, rows_of, capfd):
     assert said in capfd.readouterr().out
 
 
-@pytest.mark.parametrize("friction", ["standard", "standard+arctan"])
+@pytest.mark.parametrize("friction", ["standard", pytest.param("standard+arctan", marks=pytest.mark.thorough)])
 def test_torques_of_other_tools_are_judged_on_the_same_rows(arm, scara_logs, rows_of, tmp_path, friction):
     """Right ones, none, our own (of laws that are linear about an estimate, too), and files that are none."""
     changed(arm, 'robot = "scara"', f'robot = "scara", friction = "{friction}"')

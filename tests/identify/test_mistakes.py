@@ -56,6 +56,7 @@ def test_a_fault_is_named_and_none_where_there_is_none(kind):
     assert case("panda", kind).right()
 
 
+@pytest.mark.thorough
 def test_the_size_of_a_mistake_is_found_within_its_sigma():
     """A zero of the third joint 1 degree off at 4 % noise, within 3 sigma and 3 % for what is not linear."""
     (first, *_) = case("panda", "zero", 0.5, size=np.radians(5)).found()
@@ -135,7 +136,10 @@ def test_large_mistakes_are_named_on_each_motion(robot, name, cause):
     assert [each[0].cause if each else None for each in found] == [cause] * 3
 
 
-@pytest.mark.parametrize("fault", [{"kind": "exchanged-torques", "at": 0.7}, LARGE["wall"], {}])
+@pytest.mark.parametrize(
+    "fault",
+    [{"kind": "exchanged-torques", "at": 0.7}, *(pytest.param(x, marks=pytest.mark.thorough) for x in (LARGE["wall"], {}))],
+)
 def test_the_middle_of_a_log_leaves_the_mistake_that_all_of_it_shows(fault):
     """Most are refuted by it; the one that explains most is not."""
     problem = case("puma560", **fault, unusual={"time": 120.0}).problem().explicit

@@ -70,6 +70,7 @@ def test_with_links_held_their_size_is_known(made):
     np.testing.assert_allclose(found[:3], 1.3, rtol=0.02)
 
 
+@pytest.mark.thorough
 def test_a_gain_that_a_log_would_not_show_is_not_named_and_one_that_it_would_is(made):
     """At half and twice of what it says it would hide."""
     hidden = TorqueGains.of(made(np.ones(6))).hidden
