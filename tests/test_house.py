@@ -14,7 +14,7 @@ SAME_NAME = {
 }
 """Classes of one name in several files, and why."""
 
-LINES = {".py": 53_288, ".c": 705, ".h": 28, ".txt": 321, ".j2": 278}
+LINES = {".py": 53_287, ".c": 705, ".h": 28, ".txt": 321, ".j2": 278}
 """Lines of Python, of C, and of templates of code and pages."""
 
 BASES = {"Plant", "Table", "Command", "WrittenOptions", "RecordedOptions", "LogRequest", "LoadRequest"}

@@ -14,7 +14,7 @@ Call = TypeVar("Call", bound=Callable[..., Any])
 
 
 def with_keys(request: Any, taken: Container[str] = ()) -> Callable[[Call], Call]:
-    """Return what names the keywords of a function in its signature, which help and tab completion read: those of a request."""
+    """Decorator that puts the keys of a request into the signature of a function, which help and tab completion read."""
 
     def signed(call: Call) -> Call:
         own, keyword, nothing = inspect.signature(call), inspect.Parameter.KEYWORD_ONLY, inspect.Parameter.empty
